@@ -1,7 +1,7 @@
 """Many friction contacts: time to load, to a first orbit, and of a response curve; docs/benchmarks-states.md.
 
 ``python benchmarks/contacts.py``: 20 masses on springs of their own and between neighbours, a harmonic force
-on the first mass. Some masses rub on the ground. No mode and no word is given. Each size is a process of its
+on the first mass. Some masses rub on the ground. No mode and no itinerary is given. Each size is a process of its
 own, with compiled kernels on disk.
 """
 
@@ -58,7 +58,7 @@ def measure(contacts: int) -> dict[str, float]:
         "events": sum(b.kind != "T" for b in diagram.bifurcations),
         "loose": len(diagram.loose_ends),
         "modes": len(model.modes),
-        "stops": len(orbit.word),
+        "stops": len(orbit.itinerary),
     }
 
 

@@ -78,7 +78,7 @@ def absent() -> str:
     return f"Not installed, and therefore left out: {', '.join(missing)}."
 
 
-def words(results: dict[str, list[Row]], compiling: float, took: float, most: int) -> dict:
+def itineraries(results: dict[str, list[Row]], compiling: float, took: float, most: int) -> dict:
     """Return what the page is filled with."""
     filled = {}
     for name, rows in results.items():
@@ -122,7 +122,7 @@ def main() -> None:
     template = Path(__file__).with_name("error_page.md")
     page = docs / "benchmarks-error.md"
     page.write_text(
-        template.read_text(encoding="utf-8").format(**words(results, compiling, took, most)),
+        template.read_text(encoding="utf-8").format(**itineraries(results, compiling, took, most)),
         encoding="utf-8",
     )
     print(page.read_text(encoding="utf-8"))

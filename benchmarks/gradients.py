@@ -17,7 +17,7 @@ from typing import Any
 
 import contfric as cf
 from contfric.orbit.gradient import by_parameters
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 ROUNDS = 40
 QUANTITIES = ("x_max", "mean({v})", "rms({v})", "amplitude({x}, 1)", "energy")
@@ -53,7 +53,7 @@ def calls(name: str) -> dict[str, Callable[[], Any]]:
     moved[0] *= 1.001
     found: dict[str, Callable[[], Any]] = {
         "the user's call": solved,
-        "Newton's method": lambda: polish(replace(orbit, vector=moved)),
+        "Newton's method": lambda: refine(replace(orbit, vector=moved)),
     }
     if parameter:
         found["a branch"] = lambda: cf.continue_orbit(orbit, parameter, limits)

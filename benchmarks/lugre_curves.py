@@ -22,7 +22,7 @@ import contfric as cf
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import null_vector
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Points of each curve that are compared, and points of each side of a run.
 COUNT, POINTS = 10, 14
@@ -45,11 +45,11 @@ def starts(
                 settings = settings_of(moved, name, bounds, None, True, POINTS)
                 point = first_point(moved, settings, phi, 0.0)
                 if point is not None:
-                    yield polish(point.orbit(orbit.system, orbit.vector, active), damped=False)
+                    yield refine(point.orbit(orbit.system, orbit.vector, active), damped=False)
                 continue
             vector = orbit.vector.copy()
             vector[active] += sign * distance * width
-            yield polish(replace(orbit, vector=vector), damped=False)
+            yield refine(replace(orbit, vector=vector), damped=False)
 
 
 def difference(curve: cf.Curve, k: int, bounds: dict[str, tuple[float, float]]) -> float:

@@ -26,7 +26,7 @@ def measured_rate(orbit: cf.Orbit) -> tuple[float, int]:
     flow, none = orbit.model.flow, np.empty(0, dtype=np.int64)
     nothing, period = np.empty((0, 0)), orbit.period
     start, t = orbit.joints[0, 1:].copy(), float(orbit.joints[0, 0])
-    mode = [m.name for m in orbit.model.modes].index(orbit.word[0][0])
+    mode = [m.name for m in orbit.model.modes].index(orbit.itinerary[0][0])
 
     def turn(y: np.ndarray) -> np.ndarray:
         out = np.empty_like(y)

@@ -21,7 +21,7 @@ import numpy as np
 import contfric as cf
 from contfric.models.describe import from_text
 from contfric.models.files import built
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 
 #: What is varied: tolerance of the integration; phase of the cut with the largest step.
@@ -61,8 +61,10 @@ def moved_cut(orbit: cf.Orbit, model: cf.Model, phase: float) -> cf.Orbit:
             model.flow.flow(
                 0, joint[0], joint[1:].copy(), ahead, vector, none, joints[k, 1:], nothing
             )
-    system = build_system(model, orbit.system.word, orbit.system.periods, half=orbit.system.half)
-    return polish(cf.Orbit(system, joints, vector, 0.0), damped=False)
+    system = build_system(
+        model, orbit.system.itinerary, orbit.system.periods, half=orbit.system.half
+    )
+    return refine(cf.Orbit(system, joints, vector, 0.0), damped=False)
 
 
 def places(diagram: cf.Diagram) -> Iterator[Place]:

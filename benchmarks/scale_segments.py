@@ -22,7 +22,7 @@ from settings import OMEGA, orbit_at
 
 import contfric as cf
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
@@ -76,7 +76,7 @@ def unsolved(orbit: Orbit) -> Orbit:
 
 def solve(start: Orbit) -> tuple[Orbit, str]:
     """Newton, undamped: as a continuation has it."""
-    orbit = polish(start, damped=False)
+    orbit = refine(start, damped=False)
     if not orbit.converged:
         raise Failure(orbit.status.value)
     return orbit, ""
@@ -101,8 +101,8 @@ def asked(orbit: Orbit, attribute: str) -> tuple[Any, str]:
 
 def assemble(orbit: Orbit) -> tuple[Any, str]:
     """The arrays of the boundary-value problem; the cache of those that are known is passed by."""
-    word = orbit.system.word
-    return build_system.__wrapped__(orbit.model, word, orbit.periods), ""
+    itinerary = orbit.system.itinerary
+    return build_system.__wrapped__(orbit.model, itinerary, orbit.periods), ""
 
 
 def cases() -> list[Case]:

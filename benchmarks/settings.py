@@ -36,9 +36,9 @@ def orbit_at(omega: float, full: bool = False) -> Orbit:
     return full_form(orbit) if full else orbit
 
 
-def rows_of(word: tuple[tuple[str, str], ...]) -> list[int]:
-    """Rows of the release, the upper stop and the lower stop among the joints of a word."""
-    modes = [mode for mode, _ in word]
+def rows_of(itinerary: tuple[tuple[str, str], ...]) -> list[int]:
+    """Rows of the release, the upper stop and the lower stop among the joints of an itinerary."""
+    modes = [mode for mode, _ in itinerary]
     return [
         next(i for i in range(len(modes)) if modes[i] == name and modes[i - 1] != name)
         for name in ("slide+", "slide-", "stick")
@@ -47,7 +47,7 @@ def rows_of(word: tuple[tuple[str, str], ...]) -> list[int]:
 
 def joints_of(orbit: Orbit) -> tuple[float, ...]:
     """Return (t0, x0, t1, x1, t2, x2)."""
-    return tuple(map(float, orbit.joints[rows_of(orbit.word), :2].ravel()))
+    return tuple(map(float, orbit.joints[rows_of(orbit.itinerary), :2].ravel()))
 
 
 def versions() -> tuple[dict[str, str], list[str]]:
@@ -63,7 +63,7 @@ def versions() -> tuple[dict[str, str], list[str]]:
 
 @dataclass(frozen=True)
 class Method:
-    """An integrator for a slide, with the words for it."""
+    """An integrator for a slide, with the itineraries for it."""
 
     name: str
     setting: str

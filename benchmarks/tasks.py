@@ -31,7 +31,7 @@ from settings import (
 
 import contfric as cf
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: How far each time and position of a start is off: what one reads from a picture.
 OFF = 1e-2
@@ -62,7 +62,7 @@ def moved(orbit: Orbit) -> Orbit:
 
 def solved(start: Orbit) -> tuple[Orbit, str]:
     """Solve with contfric."""
-    orbit = polish(start)
+    orbit = refine(start)
     if not orbit.converged:
         raise Failure(orbit.status.value)
     return orbit, f"{orbit.system.segments} segments"
@@ -71,7 +71,7 @@ def solved(start: Orbit) -> tuple[Orbit, str]:
 def orbit_cases(methods: list[Method]) -> list[Case]:
     """Task (a)."""
     reduced, full = orbit_at(OMEGA), orbit_at(OMEGA, full=True)
-    times = reduced.joints[rows_of(reduced.word), 0]
+    times = reduced.joints[rows_of(reduced.itinerary), 0]
     exact = Reference(S, S0).orbit(OMEGA, [f"{t:.6f}" for t in times])
     start, whole = moved(reduced), moved(full)
     joints, params = joints_of(start), (OMEGA, S, S0)
@@ -109,7 +109,7 @@ def fold_on(orbit: Orbit, low: float, high: float) -> tuple[float, str]:
 def exact_fold() -> Any:
     """Omega of the fold to 40 digits, from the fold to three digits and its joints to three."""
     near = cf.continue_orbit(orbit_at(NEAR_FOLD), "Omega", FOLD_ONLY).bifurcations[0]
-    times = near.orbit.joints[rows_of(near.orbit.word), 0]
+    times = near.orbit.joints[rows_of(near.orbit.itinerary), 0]
     return Reference(S, S0).fold(f"{near.params['Omega']:.3g}", [f"{t:.3f}" for t in times])
 
 
@@ -146,7 +146,7 @@ def followed(orbit: Orbit, stability: bool) -> tuple[arclength.Followed, str]:
     """Follow the whole branch with contfric."""
     branch = cf.continue_orbit(orbit, "Omega", WHOLE, stability=stability)
     folds = [b.params["Omega"] for b in branch.bifurcations if b.kind == "SN"]
-    rows = rows_of(branch.system.word)
+    rows = rows_of(branch.system.itinerary)
     joints = branch.joints[:, rows, :2].reshape(len(branch), -1)
     points = list(zip(branch.values, joints, strict=True))
     return arclength.Followed(points, *folds), f"{len(branch)} points"
@@ -155,7 +155,7 @@ def followed(orbit: Orbit, stability: bool) -> tuple[arclength.Followed, str]:
 def branch_task() -> arclength.Task:
     """The branch as the peers are given it: both ends, and steps for as many points as contfric has."""
     branch = cf.continue_orbit(orbit_at(OMEGA), "Omega", WHOLE)
-    releases = branch.joints[:, rows_of(branch.system.word)[0], 0]
+    releases = branch.joints[:, rows_of(branch.system.itinerary)[0], 0]
     length = np.hypot(np.diff(releases), np.diff(branch.values)).sum()
     lower, upper = (float(end.bifurcation.params["Omega"]) for end in branch.ends)
     t0 = joints_of(orbit_at(OMEGA))[0]

@@ -140,17 +140,18 @@ class AperiodicError(ConvergenceError):
 _MOST_NAMES, _NEAREST = 24, 12
 
 
-def did_you_mean(word: object, valid: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the closest valid words, and the list of valid words.
+def did_you_mean(itinerary: object, valid: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the closest valid itineraries, and the list of valid itineraries.
 
     Examples
     --------
     >>> did_you_mean("Omga", ["Omega", "S"])
     "; did you mean 'Omega'? Valid: Omega, S"
     """
-    names, word = [str(name) for name in valid], str(word)
+    names, itinerary = [str(name) for name in valid], str(itinerary)
     likeness = {  # upper and lower case count as the same
-        name: difflib.SequenceMatcher(None, word.lower(), name.lower()).ratio() for name in names
+        name: difflib.SequenceMatcher(None, itinerary.lower(), name.lower()).ratio()
+        for name in names
     }
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]

@@ -196,9 +196,9 @@ class Bound:
         module = library.create_ir_module(name)
         function = ir.Function(module, outer, name)
         builder = ir.IRBuilder(function.append_basic_block())
-        word = ir.IntType(64)
-        code = builder.inttoptr(ir.Constant(word, self._kernel.address), inner.as_pointer())
-        handle = ir.Constant(word, self._block.address)
+        itinerary = ir.IntType(64)
+        code = builder.inttoptr(ir.Constant(itinerary, self._kernel.address), inner.as_pointer())
+        handle = ir.Constant(itinerary, self._block.address)
         builder.ret(builder.call(code, [handle, *function.args]))
         with global_compiler_lock:
             library.add_ir_module(module)

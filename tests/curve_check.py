@@ -8,7 +8,7 @@ import numpy as np
 
 import contfric as cf
 from contfric.continuation.switching import null_vector
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: How far beside a point the run starts, and how far it goes.
 OFFSETS = (1e-4, -1e-4, 1e-3, -1e-3, 1e-5, -1e-5)
@@ -23,7 +23,7 @@ def beside(orbit, parameter):
             vector = orbit.vector.copy()
             vector[orbit.model.index_of(parameter)] += offset
             moved = replace(orbit, joints=orbit.joints + push * away, vector=vector)
-            solved = polish(moved, damped=False)
+            solved = refine(moved, damped=False)
             near = np.max(np.abs(solved.joints - orbit.joints)) < 0.1
             if solved.converged and near and solved.admissible:
                 yield solved

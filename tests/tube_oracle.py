@@ -183,7 +183,7 @@ def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
     )
 
 
-def _other_word(data: dict[str, Any], rng: np.random.Generator) -> None:
+def _other_itinerary(data: dict[str, Any], rng: np.random.Generator) -> None:
     kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     way = rng.uniform()
     if way < 0.4:
@@ -197,6 +197,6 @@ def _other_word(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 _CHANGES = (
-    *(_move_number, _other_knots, _other_events, _other_end, _other_params, _other_word),
+    *(_move_number, _other_knots, _other_events, _other_end, _other_params, _other_itinerary),
     _other_events,
 )

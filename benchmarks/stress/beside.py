@@ -15,7 +15,7 @@ from report import Tally
 from scenes import refusal
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import Margin, Test
 
 #: Distance to an event in its parameter, and of a stop to a surface.
@@ -64,7 +64,7 @@ def moved(event: cf.Bifurcation, parameter: str, by: float) -> cf.Orbit | None:
         orbit.model.vector(orbit.model.mapping(vector))
     except cf.ParameterError:
         return None
-    return polish(replace(orbit, vector=vector), damped=False)
+    return refine(replace(orbit, vector=vector), damped=False)
 
 
 def beside(

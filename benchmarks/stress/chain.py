@@ -110,7 +110,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Chain:
-    """The equations of one word.
+    """The equations of one itinerary.
 
     Attributes
     ----------
@@ -127,12 +127,12 @@ class Chain:
 
     @classmethod
     def of(cls, orbit: cf.Orbit) -> Chain:
-        """Return the chain of an orbit's word, on its half if it is solved there."""
+        """Return the chain of an orbit's itinerary, on its half if it is solved there."""
         mode = {"slide+": 1, "slide-": -1, "stick": 0}
         side = {"F+": 1, "F-": -1, "v": 0}
-        word, half = orbit.system.word, orbit.system.half
+        itinerary, half = orbit.system.itinerary, orbit.system.half
         turns = mpf(orbit.periods) / (2 if half else 1)
-        modes, exits = zip(*word, strict=True)
+        modes, exits = zip(*itinerary, strict=True)
         return cls(
             tuple(mode[m] for m in modes),
             tuple(side[e] for e in exits),

@@ -116,13 +116,13 @@ def explored(
         max_step=step,
         max_branches=MOST_BRANCHES,
     )
-    words = [
+    itineraries = [
         Counter((identity(b[0]), b.system.half, b.mirrored) for b in d.branches)
         for d in (diagram, fine)
     ]
     names = [sorted(b.name for b in d.branches if not b.mirrored) for d in (diagram, fine)]
     text = f"{where}: {names[0]}, with smaller steps {names[1]}"
-    tally.check("diagram: the same branches", words[0] == words[1], text)
+    tally.check("diagram: the same branches", itineraries[0] == itineraries[1], text)
     pairs = [
         [(b.kind.value, b.params[d.parameter]) for b in d.bifurcations] for d in (diagram, fine)
     ]

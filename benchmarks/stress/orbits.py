@@ -18,7 +18,7 @@ from report import Report, Tally, command_line
 from scenes import Params, generator, refusal, start, strictly, time_limit
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 WHAT = "Orbits from random starts, compared with their equations solved in 50 digits."
 #: Longest that one case may take (s): the slowest of the first thousand took a tenth of it.
@@ -120,7 +120,7 @@ def shifted(tally: Tally, orbit: cf.Orbit, periods: int, where: str) -> None:
     """The same orbit many periods later: the same, to the digits that its times have left."""
     joints = orbit.joints.copy()
     joints[:, 0] += periods * orbit.period
-    later = polish(replace(orbit, joints=joints), damped=False)
+    later = refine(replace(orbit, joints=joints), damped=False)
     where = f"{where}, shifted by {periods} turns"
     if not later.converged:  # its times have no digits left that Newton could correct
         tally.met(f"shifted by {periods:.0e}: not converged, and says so")
@@ -186,7 +186,7 @@ def cascade(tally: Tally, orbit: cf.Orbit, rng: np.random.Generator) -> None:
             continue
         where = f"{middle.params}, {middle.periods} periods, {middle.name}"
         try:
-            judge(tally, "on a branch", polish(middle, damped=False), where)
+            judge(tally, "on a branch", refine(middle, damped=False), where)
         except NoReference:
             tally.met("no reference for a point of a branch")
         tally.met(f"on a branch, periods: {_class(middle.periods)}")

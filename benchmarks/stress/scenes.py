@@ -102,9 +102,9 @@ def start(rng: np.random.Generator) -> tuple[str, Params, cf.Orbit | None, str]:
 def refusal(error: cf.ContfricError) -> str:
     """Return why there is no orbit, without its numbers."""
     text = str(error)
-    for words in ("rest for ever", "grows without bound", "has not converged", "aperiodic"):
-        if words in text:
-            return f"{type(error).__name__}: {words}"
+    for itineraries in ("rest for ever", "grows without bound", "has not converged", "aperiodic"):
+        if itineraries in text:
+            return f"{type(error).__name__}: {itineraries}"
     text = re.sub(r" '[^']*'| at .*", "", text.split(":", maxsplit=1)[0])
     return f"{type(error).__name__}: {text}"
 

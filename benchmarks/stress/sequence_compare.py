@@ -105,7 +105,7 @@ class _Comparison:
         """Return how the comparison ended."""
         longest = PERIODS * float(self.law.period) * (1 + 1e-9)  # an event at the very end is seen
         events = follow(self.law, self.case.start, longest)
-        word = self.motion.word
+        itinerary = self.motion.itinerary
         for k in range(MAX_EVENTS):
             try:
                 event = next(events)
@@ -113,9 +113,9 @@ class _Comparison:
                 return self._pass("undecidable: in fifty digits")
             noise = self.rounding.event(event)
             after = self.spread.through(event, noise)
-            if k == len(word) or event.surface in ("held", "time"):
+            if k == len(itinerary) or event.surface in ("held", "time"):
                 return self._end(k, event, after)
-            if (event.mode, event.surface) != word[k] or self._apart(k, event, after):
+            if (event.mode, event.surface) != itinerary[k] or self._apart(k, event, after):
                 return self._differ(k, event)
             ended = self._measure(k, event, after)
             if ended:
@@ -180,7 +180,7 @@ class _Comparison:
         """Say which of the two is right: a graze within the errors is either's, all else is a failure."""
         name, ours = f"{event.mode} -> {event.surface}", "nothing"
         if k < len(self.motion):
-            ours = f"{' -> '.join(self.motion.word[k])} with error {self._errors(k, event)[0]:.2e}"
+            ours = f"{' -> '.join(self.motion.itinerary[k])} with error {self._errors(k, event)[0]:.2e}"
             if self._is_leaving(k, event):
                 return self._pass("undecidable: leaving")
             if self._is_graze(k, event):
@@ -200,7 +200,11 @@ class _Comparison:
     def _is_leaving(self, k: int, event: Event) -> bool:
         """Tell whether a slide that contfric ends at its start is pushed by no more than rounding."""
         slide, p = event.segment, self.case.params
-        if not isinstance(slide, Slide) or self.motion.word[k][0] != event.mode or slide.v0 != 0:
+        if (
+            not isinstance(slide, Slide)
+            or self.motion.itinerary[k][0] != event.mode
+            or slide.v0 != 0
+        ):
             return False
         with working_precision(self.law.bits):
             f, f1, _, _ = (float(c) for c in self.law.force(slide.start_phase))
@@ -219,7 +223,7 @@ class _Comparison:
     def _is_graze(self, k: int, event: Event) -> bool:
         """Tell whether what vanishes at contfric's event vanishes within the errors in fifty digits."""
         segment = event.segment
-        mode, surface = self.motion.word[k]
+        mode, surface = self.motion.itinerary[k]
         if mode != event.mode or (surface == "v") != isinstance(segment, Slide):
             return False
         with working_precision(self.law.bits):

@@ -25,7 +25,7 @@ from contfric.errors import ContfricError
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import simulate
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram, Node
@@ -164,9 +164,9 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
         run = simulate(model, params, state=state, time=float(time), periods=_TRIED, events=_EVENTS)
     except ContfricError:  # no such state there, or a value outside of the limits
         return False
-    if not all(model.mode_by_name[mode].sliding for mode, _ in run.word):
+    if not all(model.mode_by_name[mode].sliding for mode, _ in run.itinerary):
         return False
-    if all(model.is_at_rest(mode) for mode, _ in run.word):
+    if all(model.is_at_rest(mode) for mode, _ in run.itinerary):
         return True
     visited = np.array([*run.states, run.last[2]])  # where one mass rests others may move
     return bool(np.max(np.abs(visited - state)) < _STILL)
@@ -352,6 +352,6 @@ def orbits_at(branch: Branch, value: float) -> Iterator[Orbit]:
     for k in np.flatnonzero(ahead[:-1] * ahead[1:] < 0.0):
         share = ahead[k] / (ahead[k] - ahead[k + 1])
         joints = branch.joints[k] + share * (branch.joints[k + 1] - branch.joints[k])
-        solved = polish(Orbit(branch.system, joints, vector, np.inf), damped=False)
+        solved = refine(Orbit(branch.system, joints, vector, np.inf), damped=False)
         nearest = int(k) if share < 0.5 else int(k) + 1
         yield solved if solved.converged else branch[nearest]

@@ -14,7 +14,7 @@ from contfric.continuation.points import Settings, settings_of
 from contfric.continuation.switching import leave_along
 from contfric.continuation.trace import follow_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 Depart = Callable[[Exploration, Orbit, Event, EndReason, Direction], None]
 
@@ -56,7 +56,7 @@ def _follow_through(
         if start is None or not settings.low <= start.point.value <= settings.high:
             continue
         active = orbit.model.index_of(settings.parameter)
-        there = polish(start.point.orbit(orbit.system, orbit.vector, active), damped=False)
+        there = refine(start.point.orbit(orbit.system, orbit.vector, active), damped=False)
         if not (there.converged and there.admissible):
             continue
         known = state.known(there)

@@ -143,7 +143,7 @@ class Exploration:
         return next((i for i, b in enumerate(self.branches) if on_branch(orbit, b)), None)
 
     def ends_here(self, orbit: Orbit, event: Event) -> int | None:
-        """Return the branch of the orbit's word that already ends at an event; None if none does."""
+        """Return the branch of the orbit's itinerary that already ends at an event; None if none does."""
         wanted, mirror = identity(orbit), orbit.model.symmetry is not None
         width = self.settings.width
         for index, branch in enumerate(self.branches):

@@ -27,7 +27,7 @@ from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.remember.advance import in_advance
 
 #: Longest orbits, in periods, that doublings are followed to by default: two doublings.
@@ -151,7 +151,7 @@ def _first_branch(state: Exploration, orbit: Orbit) -> Branch:
         return follow_orbit(orbit, settings, state.progress, keep=True)
     except ConvergenceError:
         middle = symmetrised(orbit.as_whole(), np.inf)
-        solved = None if middle is None else polish(middle)
+        solved = None if middle is None else refine(middle)
         if solved is None or not (solved.converged and solved.admissible):
             raise
     state.notes.append("the start is one of a continuum of orbits: the symmetric one is continued")

@@ -1,4 +1,4 @@
-"""What a branch must not be: the orbits of another word, or shorter ones, that solve its equations."""
+"""What a branch must not be: the orbits of another itinerary, or shorter ones, that solve its equations."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
 
 
 def _only_touches(branch: Branch) -> bool:
-    """Tell whether a word has modes that periodic motion cannot be in (:mod:`contfric.orbit.one_way`)."""
-    return bool(only_grows(branch.model, branch[0].as_whole().word))
+    """Tell whether an itinerary has modes that periodic motion cannot be in (:mod:`contfric.orbit.one_way`)."""
+    return bool(only_grows(branch.model, branch[0].as_whole().itinerary))
 
 
 def _never_held(branch: Branch) -> bool:
@@ -58,7 +58,7 @@ def _never_held(branch: Branch) -> bool:
 def _never_lasts(branch: Branch) -> bool:
     """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
 
-    Where orbits are a continuum those of them that touch a surface solve the equations of a word with a
+    Where orbits are a continuum those of them that touch a surface solve the equations of an itinerary with a
     segment there, of no length. A segment that comes in at an event grows at least with the distance.
     """
     asked = {round(share * (len(branch) - 1)) for share in _ASKED}
@@ -97,11 +97,11 @@ _FAULTS = (
     ),
     (
         _never_held,
-        "its hold has no length anywhere: the motion of another word, that only touches rest",
+        "its hold has no length anywhere: the motion of another itinerary, that only touches rest",
     ),
     (
         _never_lasts,
-        "a segment of it has no length anywhere: the motion of another word, that touches a surface",
+        "a segment of it has no length anywhere: the motion of another itinerary, that touches a surface",
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_repeats, "its orbits are shorter ones, run through several times"),

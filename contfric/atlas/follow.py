@@ -49,9 +49,9 @@ from contfric.continuation.switching import (
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import polish
-from contfric.orbit.system import Word
-from contfric.signature import canonical_word
+from contfric.orbit.solve import refine
+from contfric.orbit.system import Itinerary
+from contfric.signature import canonical_itinerary
 from contfric.signature.edits import show
 
 #: Where an orbit near an event is looked for, relative to the range.
@@ -106,7 +106,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     )  # else nothing rests
     for wide in (False, True) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
-        words: set[Word] = set()
+        itineraries: set[Itinerary] = set()
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
@@ -117,8 +117,10 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
                 state.judge(event, "other orders of the changes", Verdict.REFUSED, why=GOES_ON)
                 break
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
-                words |= candidate.words
-        event.kinds |= {n.kind for n in incident.names if n.before & words and n.after & words}
+                itineraries |= candidate.itineraries
+        event.kinds |= {
+            n.kind for n in incident.names if n.before & itineraries and n.after & itineraries
+        }
         if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it
@@ -126,39 +128,39 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
 
 
 def _follow_flow(state: Exploration, event: Event) -> None:
-    """Try the words that motions near an event walk."""
+    """Try the itineraries that motions near an event walk."""
     orbit, settings = event.bifurcation.orbit, state.settings
     if orbit.system.holds:
         return
     active = orbit.model.index_of(settings.parameter)
     shifts = tuple((active, share * settings.width) for share in _SHARES)
-    reason = "the word that the flow walks near the event"
-    refused: dict[Word, str] = {}
-    done: set[Word] = set()
-    creeps: set[Word] = set()
+    reason = "the itinerary that the flow walks near the event"
+    refused: dict[Itinerary, str] = {}
+    done: set[Itinerary] = set()
+    creeps: set[Itinerary] = set()
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
-        word = canonical_word(guess.word, orbit.model)
-        if word in done:
+        itinerary = canonical_itinerary(guess.itinerary, orbit.model)
+        if itinerary in done:
             continue
-        if only_grows(orbit.model, guess.word):  # on its way to another orbit
-            creeps.add(word)
-            refused.setdefault(word, f"no periodic motion is {show(guess.word)}")
+        if only_grows(orbit.model, guess.itinerary):  # on its way to another orbit
+            creeps.add(itinerary)
+            refused.setdefault(itinerary, f"no periodic motion is {show(guess.itinerary)}")
             continue
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if _meets(e, event, settings)]
         if branch is None or not ends or fault_of(branch):
-            refused.setdefault(word, f"no orbit of {show(guess.word)} meets the event")
+            refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
-        done.add(word)
+        done.add(itinerary)
         if (known := state.known(branch[len(branch) // 2])) is not None:
             state.judge(event, reason, Verdict.KNOWN, known)
         else:
             state.accept(event, reason, branch)
             for end in ends:
                 state.merge(event, end)
-    for word in (w for w in refused if w not in done):
-        state.judge(event, reason, Verdict.REFUSED, why=refused[word])
+    for itinerary in (w for w in refused if w not in done):
+        state.judge(event, reason, Verdict.REFUSED, why=refused[itinerary])
     if creeps and creeps == refused.keys() and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
 
@@ -291,7 +293,7 @@ def _through(state: Exploration, orbit: Orbit) -> Branch | None:
             continue
         vector = orbit.vector.copy()
         vector[active] = beside
-        solved = polish(Orbit(orbit.system, orbit.joints, vector, np.inf))
+        solved = refine(Orbit(orbit.system, orbit.joints, vector, np.inf))
         if solved.converged and solved.admissible:
             return whole_branch(shortest(solved), settings)
     return None

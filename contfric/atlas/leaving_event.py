@@ -1,4 +1,4 @@
-"""Tracing away from an event: in the direction in which an orbit of another word is admissible."""
+"""Tracing away from an event: in the direction in which an orbit of another itinerary is admissible."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 
-#: First step away from an event, in largest steps: the new word is proved close to it. Where the parameter
+#: First step away from an event, in largest steps: the new itinerary is proved close to it. Where the parameter
 #: stands there (a share of the tangent below the second number), it and margins change by the square of the
 #: step, which may be rounding: then a longer one is tried.
 _NEAR_EVENT, _STANDS = (0.01, 0.1), 1e-9

@@ -13,12 +13,12 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import modulo
-from contfric.orbit.solve import polish
-from contfric.orbit.system import Word
-from contfric.orbit.words import mirror_pairs
-from contfric.signature import ReducedWord, canonical_word
+from contfric.orbit.solve import refine
+from contfric.orbit.system import Itinerary
+from contfric.signature import ReducedItinerary, canonical_itinerary
 
 #: Events whose parameters agree to their accuracy and whose motions agree to this are one.
 SAME_MOTION = 1e-4
@@ -36,17 +36,17 @@ ROUNDING, _TWICE = 1e-11, 2.0
 _APART = 0.05
 
 
-def identity(orbit: Orbit) -> frozenset[ReducedWord]:
-    """Return the orbit's reduced word and its mirror image, canonical."""
-    return _images(orbit.model, orbit.word)
+def identity(orbit: Orbit) -> frozenset[ReducedItinerary]:
+    """Return the orbit's reduced itinerary and its mirror image, canonical."""
+    return _images(orbit.model, orbit.itinerary)
 
 
 @cache
-def _images(model: Model, word: Word) -> frozenset[ReducedWord]:
-    words = {canonical_word(word, model)}
+def _images(model: Model, itinerary: Itinerary) -> frozenset[ReducedItinerary]:
+    itineraries = {canonical_itinerary(itinerary, model)}
     if model.symmetry is not None:
-        words.add(canonical_word(mirror_pairs(model, word), model))
-    return frozenset(words)
+        itineraries.add(canonical_itinerary(mirror_pairs(model, itinerary), model))
+    return frozenset(itineraries)
 
 
 def distance(a: FloatArray, b: FloatArray) -> float:
@@ -109,7 +109,7 @@ def same_place(
 def same_kind(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether two events may be one by what branches call them.
 
-    What is a grazing for one word may be a stop at the boundary of rest for another: the sliding events are
+    What is a grazing for one itinerary may be a stop at the boundary of rest for another: the sliding events are
     compared by their motions alone. A symmetric bridge may turn where an asymmetric one leaves it, and where
     it turns with one passage alone orbits of several periods end on it.
     """
@@ -155,7 +155,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     if is_continuum(branch):
         return _in_family(orbit, branch, mirror)
     for guess in _guesses(branch, orbit, value):
-        solved = polish(guess, damped=False)
+        solved = refine(guess, damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
         if alike and orbit.outline.apart(solved.outline) < SAME_MOTION:

@@ -78,7 +78,7 @@ class Plane(Shown):
     vector : ndarray
         The other parameters.
     curves : tuple of Curve
-        Each once; one event of two words (CS) is a curve of each.
+        Each once; one event of two itineraries (CS) is a curve of each.
     twins : tuple of int
         For each curve the first one with the same motion: its own index if it is that.
     regions : tuple of Region

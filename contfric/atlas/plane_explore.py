@@ -24,7 +24,7 @@ from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start
-from contfric.curves.leaving import leaving, other_words
+from contfric.curves.leaving import leaving, other_itineraries
 from contfric.curves.problem import Problem, box_of, problem_of
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import (
@@ -216,18 +216,18 @@ def _follow_bifurcation(state: PlaneExploration, bifurcation: Bifurcation) -> No
 # --------------------------------------------------------------------- points of codimension two
 
 
-def _follow_words(state: PlaneExploration) -> None:
-    """Follow CS curves in the other words for their motions."""
+def _follow_itineraries(state: PlaneExploration) -> None:
+    """Follow CS curves in the other itineraries for their motions."""
     while state.unread:
         for part in state.unread.popleft().parts:
-            for starts in _of_other_words(part, state.largest):
+            for starts in _of_other_itineraries(part, state.largest):
                 if not state.full and state.wants(starts[0][0]):
                     _follow_starts(state, starts, None)
 
 
 def _follow_special(state: PlaneExploration) -> None:
     """Follow what leaves the points that wait."""
-    _follow_words(state)
+    _follow_itineraries(state)
     while state.waiting:
         special, problem = state.waiting.popleft()
         if _is_at_limit(special, problem):
@@ -242,7 +242,7 @@ def _follow_special(state: PlaneExploration) -> None:
                 return
             if state.wants(starts[0][0]):
                 _follow_starts(state, starts, special)
-        _follow_words(state)
+        _follow_itineraries(state)
 
 
 def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
@@ -252,8 +252,8 @@ def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
 
 
 @remembered()
-def _of_other_words(part: CurvePart, largest: float) -> list[list[Start]]:
-    return list(_paired(other_words(part, largest)))
+def _of_other_itineraries(part: CurvePart, largest: float) -> list[list[Start]]:
+    return list(_paired(other_itineraries(part, largest)))
 
 
 @remembered()

@@ -24,7 +24,7 @@ _SAME = 1e-6
 def group_of(kind: Kind, model: Model) -> Kind:
     """Return the kind under which curves are compared: a CS turns into an SS.
 
-    Where nothing jumps one event may have a name for each of the words that meet there.
+    Where nothing jumps one event may have a name for each of the itineraries that meet there.
     """
     if kind is Kind.SS or (model.filippov and kind in TERMINAL):
         return Kind.CS
@@ -32,25 +32,25 @@ def group_of(kind: Kind, model: Model) -> Kind:
 
 
 def is_known(
-    problem: Problem, point: Point, curves: list[Curve], same_word: bool = True
+    problem: Problem, point: Point, curves: list[Curve], same_itinerary: bool = True
 ) -> int | None:
     """Return the index of the curve that a point lies on; None if on none.
 
-    Without ``same_word`` the motions are compared, whatever their words.
+    Without ``same_itinerary`` the motions are compared, whatever their itineraries.
     """
     orbit = problem.orbit(point.joints, point.w)
     for index, curve in enumerate(curves):
         for part in curve.parts:
             if group_of(part.kind, orbit.model) is not group_of(problem.kind, orbit.model):
                 continue
-            if same_word and not _same_word(orbit, part):
+            if same_itinerary and not _same_itinerary(orbit, part):
                 continue
             if _on_part(orbit, point.w, part, problem):
                 return index
     return None
 
 
-def _same_word(orbit: Orbit, part: CurvePart) -> bool:
+def _same_itinerary(orbit: Orbit, part: CurvePart) -> bool:
     system = part.system
     if system.periods != orbit.periods or system.half != orbit.system.half:
         return False
@@ -110,13 +110,13 @@ def _solved_there(
 
 
 def twins_of(curves: list[Curve]) -> tuple[int, ...]:
-    """Return for each curve the first one of the same motions, in whatever words."""
+    """Return for each curve the first one of the same motions, in whatever itineraries."""
     found: list[int] = []
     for index, curve in enumerate(curves):
         part = max(curve.parts, key=lambda p: float(p.arc[-1] - p.arc[0]))
         first = index
         if part.problem is not None and part.kind in TERMINAL:
-            known = is_known(part.problem, _middle(part), curves[:index], same_word=False)
+            known = is_known(part.problem, _middle(part), curves[:index], same_itinerary=False)
             first = index if known is None else found[known]
         found.append(first)
     return tuple(found)

@@ -21,7 +21,7 @@ from contfric.base.interrupts import held_back
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Box
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import Word
+from contfric.orbit.system import Itinerary
 from contfric.remember.journal import remembered
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
@@ -34,17 +34,17 @@ _AWAY = 1.5
 
 @dataclass(frozen=True)
 class Living:
-    """Orbits of one word in a region; the name does not count, for T changes it."""
+    """Orbits of one itinerary in a region; the name does not count, for T changes it."""
 
-    word: Word
+    itinerary: Itinerary
     half: bool
     stable: bool
     name: str = field(compare=False)
 
     @property
-    def key(self) -> tuple[Word, bool]:
-        """What one name belongs to: the word, and whether the orbits are symmetric."""
-        return self.word, self.half
+    def key(self) -> tuple[Itinerary, bool]:
+        """What one name belongs to: the itinerary, and whether the orbits are symmetric."""
+        return self.itinerary, self.half
 
 
 @remembered()
@@ -168,16 +168,16 @@ def _families(
     return found
 
 
-def _names(orbits: Iterable[Living]) -> dict[tuple[Word, bool], str]:
-    """Return the shortest name of the orbits of each word: T changes labels, and nothing else."""
-    names: dict[tuple[Word, bool], str] = {}
+def _names(orbits: Iterable[Living]) -> dict[tuple[Itinerary, bool], str]:
+    """Return the shortest name of the orbits of each itinerary: T changes labels, and nothing else."""
+    names: dict[tuple[Itinerary, bool], str] = {}
     for living in orbits:
         known = names.get(living.key, living.name)
         names[living.key] = min(known, living.name, key=lambda name: (len(name), name))
     return names
 
 
-def _named(orbits: set[Living], names: dict[tuple[Word, bool], str]) -> tuple[Family, ...]:
+def _named(orbits: set[Living], names: dict[tuple[Itinerary, bool], str]) -> tuple[Family, ...]:
     return tuple(sorted({Family(names[one.key], one.stable) for one in orbits}))
 
 
@@ -210,9 +210,9 @@ def _living(box: Box, section: Diagram, varies: int, cell: int) -> set[Living]:
     for branch in section.branches:
         if branch.mirrored or branch.bridge:
             continue
-        word = min(identity(branch[0]))
+        itinerary = min(identity(branch[0]))
         below = branch.values - value
         for k in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
             stable = branch.stable is not None and bool(branch.stable[k])
-            found.add(Living(word, branch.system.half, stable, branch[int(k)].name))
+            found.add(Living(itinerary, branch.system.half, stable, branch[int(k)].name))
     return found

@@ -1,4 +1,4 @@
-"""What follows where the touch that a hold is pinned to splits: the same word, pinned to the earlier touch.
+"""What follows where the touch that a hold is pinned to splits: the same itinerary, pinned to the earlier touch.
 
 See :mod:`contfric.continuation.split_touch`. The equations are singular there in the time of the pin, so that
 the orbits of the other side are looked for next to the event.
@@ -15,7 +15,7 @@ from contfric.continuation.split_touch import pinned_first, splits
 from contfric.continuation.switching import settings_value
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Where an orbit of the other side is looked for, relative to the range: the pin moves by the root of it.
 _SHARES = (1e-5, -1e-5, 1e-4, -1e-4, 1e-3, -1e-3)
@@ -41,12 +41,12 @@ def follow_split(state: Exploration, event: Event) -> bool:
 
 
 def _beside(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
-    """Return the orbit of the same word at a parameter next to the event, pinned to the first touch."""
+    """Return the orbit of the same itinerary at a parameter next to the event, pinned to the first touch."""
     settings = state.settings
     value = settings_value(orbit, settings) + share * settings.width
     if not settings.low <= value <= settings.high:
         return None
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = value
-    solved = polish(pinned_first(orbit, vector))
+    solved = refine(pinned_first(orbit, vector))
     return shortest(solved) if solved.converged and solved.admissible else None

@@ -29,7 +29,7 @@ from contfric.continuation.events import Bifurcation, EndReason
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -202,7 +202,7 @@ def _inside(branch: Branch, share: float) -> Orbit:
     k = int(share * len(branch))
     if 0 < k < len(branch) - 1:
         return branch[k]
-    return polish(branch.between(share * float(branch.arc[-1])), damped=False)
+    return refine(branch.between(share * float(branch.arc[-1])), damped=False)
 
 
 def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
@@ -253,7 +253,7 @@ def _covers(known: Branch, branch: Branch) -> bool:
 
 
 def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:
-    """Tell whether two branches of one word have the same two ends, and no width that is known.
+    """Tell whether two branches of one itinerary have the same two ends, and no width that is known.
 
     On these no value of the parameter is known to be a value of both.
     """

@@ -21,7 +21,7 @@ _FACTS = {
     "Plane": "ranges curves special regions complete notes",
     "Region": "point share families",
     "Census": "params periods orbits complete",
-    "Window": "word turns range branch",
+    "Window": "itinerary turns range branch",
     "LyapunovExponents": "motion exponents errors params periods",
     "LyapunovMap": "shape params counts complete",
     "Sweep": "parameter section params counts complete",

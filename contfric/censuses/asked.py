@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from contfric.censuses.conditions import Fate
+from contfric.censuses.itineraries import canonical_pair
 from contfric.censuses.orbits import Catalogue
-from contfric.censuses.words import canonical_pair
 from contfric.models.definition import Model
-from contfric.signature import ReducedWord
+from contfric.signature import ReducedItinerary
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Wanted:
     """Which walks may have an orbit: those within the limits that no necessary condition rules out."""
 
     model: Model
-    fates: dict[tuple[ReducedWord, int], Fate | None]
+    fates: dict[tuple[ReducedItinerary, int], Fate | None]
 
-    def __call__(self, word: ReducedWord, periods: int) -> bool:
+    def __call__(self, itinerary: ReducedItinerary, periods: int) -> bool:
         """Return whether a walk may have an orbit."""
-        walk = canonical_pair(self.model, word), periods
+        walk = canonical_pair(self.model, itinerary), periods
         return walk in self.fates and self.fates[walk] is None
 
 

@@ -1,8 +1,8 @@
 """Census: all periodic orbits at given parameters, stable or not, up to a number of periods and stops.
 
-What is asked for are closed words of the transition graph (:mod:`contfric.censuses.words`); what
+What is asked for are closed itineraries of the transition graph (:mod:`contfric.censuses.itineraries`); what
 is done is one search on each section that orbits meet (:mod:`contfric.censuses.sections`), which
-tries all words at once: a grid of starts is simulated, and refined wherever a discontinuity or a
+tries all itineraries at once: a grid of starts is simulated, and refined wherever a discontinuity or a
 near return is (:mod:`contfric.censuses.search`). Stability plays no part in it. ``docs/census.md`` says
 what follows from that for completeness, and what does not.
 """
@@ -16,18 +16,18 @@ import numpy as np
 from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.conditions import Fate, Walk, fates_before
 from contfric.censuses.grid import Grid, Limits
+from contfric.censuses.itineraries import canonical_pair, closed_itineraries
 from contfric.censuses.limits import NEAR_ENOUGH, limits_of
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import Census, SectionSearch
 from contfric.censuses.search import Progress, Search, searched
 from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
-from contfric.censuses.words import canonical_pair, closed_words
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.words import whole_of
-from contfric.signature import ReducedWord
+from contfric.orbit.itineraries import whole_of
+from contfric.signature import ReducedItinerary
 
 #: Cells of a curve: 4096 a period at first (0.02 s for walks of ten events), and where walks differ
 #: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.
@@ -132,19 +132,19 @@ class _Census:
     seed: int
     progress: Progress | None
     catalogue: Catalogue = field(default_factory=Catalogue)
-    words: list[ReducedWord] = field(default_factory=list)
-    fates: dict[tuple[ReducedWord, int], Fate | None] = field(default_factory=dict)
-    walked: set[ReducedWord] = field(default_factory=set)
+    itineraries: list[ReducedItinerary] = field(default_factory=list)
+    fates: dict[tuple[ReducedItinerary, int], Fate | None] = field(default_factory=dict)
+    walked: set[ReducedItinerary] = field(default_factory=set)
     searches: list[SectionSearch] = field(default_factory=list)
     interrupted: bool = False
 
     def prepare(self) -> None:
-        """List the words, and what necessary conditions leave of them."""
+        """List the itineraries, and what necessary conditions leave of them."""
         if self.progress is not None:
             self.progress("listing the walks")
-        self.words = closed_words(self.model, self.limits.stops)
+        self.itineraries = closed_itineraries(self.model, self.limits.stops)
         arcs = exit_arcs(self.model, self.vector)
-        self.fates = fates_before(self.model, self.words, self.limits.periods, arcs)
+        self.fates = fates_before(self.model, self.itineraries, self.limits.periods, arcs)
 
     def search(self, section: Section) -> None:
         """Search one section, in boxes of several sizes if it has positions."""
@@ -162,7 +162,7 @@ class _Census:
                 return
 
     def _search(self, section: Section, reach: float) -> Findings | None:
-        """Search one section in one box; None if no word needs it."""
+        """Search one section in one box; None if no itinerary needs it."""
         mesh = (_CURVE if section.dimension == 1 else _BOX).refined(self.finer)
         shift = np.random.default_rng(self.seed).uniform(size=section.dimension) / 2.0**mesh.coarse
         grid = Grid(section, self.vector, self.limits, shift, _BITS, reach)
@@ -181,9 +181,9 @@ class _Census:
     def _record(self, grid: Grid, mesh: Mesh, found: Findings) -> None:
         self.catalogue = found.catalogue
         for codes in found.walks:
-            word = grid.word_of(codes)
+            itinerary = grid.itinerary_of(codes)
             half = codes[-1] != grid.own
-            self.walked.add(canonical_pair(self.model, whole_of(self.model, word, half)))
+            self.walked.add(canonical_pair(self.model, whole_of(self.model, itinerary, half)))
         self.searches.append(
             SectionSearch(
                 str(grid.section),
@@ -213,7 +213,7 @@ class _Census:
             self.limits.periods,
             self.limits.stops,
             self.catalogue.sorted(),
-            tuple(self._walk(word, n) for word, n in self.fates),
+            tuple(self._walk(itinerary, n) for itinerary, n in self.fates),
             tuple(self.searches),
             limits_of(self.limits, self.searches, self.catalogue, self.interrupted),
             self.seed,
@@ -221,11 +221,11 @@ class _Census:
             self.interrupted,
         )
 
-    def _walk(self, word: ReducedWord, periods: int) -> Walk:
-        found = len(self.catalogue.orbits.get((word, periods), []))
-        fate = self.fates[word, periods]
+    def _walk(self, itinerary: ReducedItinerary, periods: int) -> Walk:
+        found = len(self.catalogue.orbits.get((itinerary, periods), []))
+        fate = self.fates[itinerary, periods]
         if found:
             fate = Fate.FOUND
         elif fate is None:
-            fate = Fate.NOT_CLOSED if word in self.walked else Fate.NOT_WALKED
-        return Walk(word, periods, fate, found)
+            fate = Fate.NOT_CLOSED if itinerary in self.walked else Fate.NOT_WALKED
+        return Walk(itinerary, periods, fate, found)

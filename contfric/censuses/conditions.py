@@ -1,7 +1,7 @@
 """Conditions that every orbit of a walk obeys, decided before anything is simulated, and what became of it.
 
 * **Displacement.** On one side of the stop surface the displacement grows, on the other it falls, at
-  rest it stays. Over a period it returns; so a word whose segments all lie on one side (or on none)
+  rest it stays. Over a period it returns; so an itinerary whose segments all lie on one side (or on none)
   has no orbit.
 * **Turns.** A sliding mode is left where the observable of its exit grows through the level. On a
   section of dimension one that is a set of phases, the **arcs** of the exit. An orbit meets the arcs of
@@ -18,7 +18,7 @@ from enum import Enum
 
 from contfric.models.definition import Model
 from contfric.orbit.system import inside_sign
-from contfric.signature import ReducedWord
+from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show
 from contfric.signature.reduced import ReducedPair
 
@@ -41,19 +41,19 @@ class Fate(str, Enum):
 
 @dataclass(frozen=True)
 class Walk:
-    """A closed word (up to rotation and mirror image) over a number of periods, and its fate."""
+    """A closed itinerary (up to rotation and mirror image) over a number of periods, and its fate."""
 
-    word: ReducedWord
+    itinerary: ReducedItinerary
     periods: int
     fate: Fate
     orbits: int = 0
 
     def __str__(self) -> str:
-        return f"{show(self.word)} over {self.periods} period(s): {self.fate.value}"
+        return f"{show(self.itinerary)} over {self.periods} period(s): {self.fate.value}"
 
 
-def returns(model: Model, word: ReducedWord) -> bool:
-    """Return whether the displacement can return: the word moves both ways, or either.
+def returns(model: Model, itinerary: ReducedItinerary) -> bool:
+    """Return whether the displacement can return: the itinerary moves both ways, or either.
 
     Examples
     --------
@@ -64,13 +64,13 @@ def returns(model: Model, word: ReducedWord) -> bool:
     surface = model.stop_surface
     if not surface:
         return True
-    moving = {mode for mode, _ in word if not model.mode_by_name[mode].sliding}
+    moving = {mode for mode, _ in itinerary if not model.mode_by_name[mode].sliding}
     sides = {inside_sign(model, mode, surface) for mode in moving}
     return 0 in sides or {1, -1} <= sides
 
 
-def least_periods(word: ReducedWord, arcs: Mapping[ReducedPair, Arcs]) -> float:
-    """Return the fewest periods in which a word's exits can be met; inf if one cannot be met.
+def least_periods(itinerary: ReducedItinerary, arcs: Mapping[ReducedPair, Arcs]) -> float:
+    """Return the fewest periods in which an itinerary's exits can be met; inf if one cannot be met.
 
     The phases ``phi_1 <= phi_2 <= .. <= phi_k <= phi_1 + p`` must lie on the arcs of the exits in turn.
     From phi_1 on, each is taken as early as possible: then phi_k is a non-decreasing function of
@@ -83,7 +83,7 @@ def least_periods(word: ReducedWord, arcs: Mapping[ReducedPair, Arcs]) -> float:
     >>> least_periods((("stick", "F+"), ("stick", "F-")) * 2, arcs)
     2.0
     """
-    chain = [arcs[pair] for pair in word if pair in arcs]
+    chain = [arcs[pair] for pair in itinerary if pair in arcs]
     if not chain:
         return 1.0
     if not all(chain):
@@ -111,13 +111,16 @@ def _next_on(arc: Arcs, phase: float) -> float:
 
 
 def fates_before(
-    model: Model, words: Sequence[ReducedWord], periods: int, arcs: Mapping[ReducedPair, Arcs]
-) -> dict[tuple[ReducedWord, int], Fate | None]:
-    """Return the fate of each (word, periods) that a necessary condition rules out, else None."""
-    fates: dict[tuple[ReducedWord, int], Fate | None] = {}
-    for word in words:
-        back, least = returns(model, word), least_periods(word, arcs)
+    model: Model,
+    itineraries: Sequence[ReducedItinerary],
+    periods: int,
+    arcs: Mapping[ReducedPair, Arcs],
+) -> dict[tuple[ReducedItinerary, int], Fate | None]:
+    """Return the fate of each (itinerary, periods) that a necessary condition rules out, else None."""
+    fates: dict[tuple[ReducedItinerary, int], Fate | None] = {}
+    for itinerary in itineraries:
+        back, least = returns(model, itinerary), least_periods(itinerary, arcs)
         for turns in range(1, periods + 1):
             fate = None if turns >= least else Fate.TURNS
-            fates[word, turns] = fate if back else Fate.ONE_WAY
+            fates[itinerary, turns] = fate if back else Fate.ONE_WAY
     return fates

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.censuses.itineraries import is_stop, letters_of, modes_after
 from contfric.censuses.sections import (
     Section,
     Sweep,
@@ -21,12 +22,11 @@ from contfric.censuses.sections import (
     period_of,
     sweep_from,
 )
-from contfric.censuses.words import is_stop, letters_of, modes_after
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.itineraries import mirror_pairs
 from contfric.orbit.simulation import SimulationEnd
 from contfric.orbit.system import IntArray, mirror_mode
-from contfric.orbit.words import mirror_pairs
-from contfric.signature import ReducedWord
+from contfric.signature import ReducedItinerary
 
 #: Starts that are simulated at once: rows of events for more would not stay in the processor's cache.
 _AT_ONCE = 4096
@@ -108,7 +108,7 @@ class Grid:
         """Most segments between two stops."""
         letters = [pair for pair in letters_of(self.model) if not is_stop(self.model, pair)]
         longest = dict.fromkeys(letters, 1)
-        for _ in letters:  # no cycle among them: census_words has refused it
+        for _ in letters:  # no cycle among them: census_itineraries has refused it
             for pair in letters:
                 after = modes_after(self.model, pair)
                 longest[pair] = 1 + max((longest[q] for q in letters if q[0] in after), default=0)
@@ -134,7 +134,7 @@ class Grid:
         """Return the code of a letter."""
         return (mode * len(self.model.surfaces) + exit_) * len(self.model.modes) + after
 
-    def word_of(self, codes: tuple[int, ...]) -> ReducedWord:
+    def itinerary_of(self, codes: tuple[int, ...]) -> ReducedItinerary:
         """Return the (mode, exit) pairs of letters."""
         modes, surfaces = self.model.modes, self.model.surfaces
         pairs = (divmod(code // len(modes), len(surfaces)) for code in codes)
@@ -142,14 +142,14 @@ class Grid:
 
     @property
     def useful(self) -> bool:
-        """Whether a word without a letter of lower dimension can pass the section."""
+        """Whether an itinerary without a letter of lower dimension can pass the section."""
         return bool(self._letters[1][self.own])
 
     @cached_property
     def _letters(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether the letter of each code is a stop, and whether this section's search has it.
 
-        Words with a letter of lower dimension are sought on the section of that letter.
+        Itineraries with a letter of lower dimension are sought on the section of that letter.
         """
         model, least = self.model, self.section.dimension
         size = len(model.modes) ** 2 * len(model.surfaces)

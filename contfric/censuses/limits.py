@@ -23,9 +23,9 @@ def limits_of(
     lines = [f"asked for: up to {limits.periods} period(s) and {limits.stops} stop(s)"]
     for search in searches:
         lines += [f"{search.section}: {text}" for text in _of_section(search, limits)]
-    for word, periods in sorted(catalogue.continua):
+    for itinerary, periods in sorted(catalogue.continua):
         lines.append(
-            f"{show(word)} over {periods} period(s): a multiplier is 1; of what may be a continuum of "
+            f"{show(itinerary)} over {periods} period(s): a multiplier is 1; of what may be a continuum of "
             "orbits one is listed"
         )
     if interrupted:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from contfric.atlas.matching import stops_distance
-from contfric.censuses.words import canonical_pair
+from contfric.censuses.itineraries import canonical_pair
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import settle
-from contfric.signature import ReducedWord
+from contfric.signature import ReducedItinerary
 
-#: Orbits of one word whose stops agree to this are one: rounding over a multiplier's distance from 1
+#: Orbits of one itinerary whose stops agree to this are one: rounding over a multiplier's distance from 1
 #: of 1e-7 (nearer to a fold the two orbits of the fold are one).
 _SAME = 1e-8
 
@@ -27,8 +27,8 @@ class Catalogue:
     continua : walks on which the orbits found are degenerate; one orbit of each is kept
     """
 
-    orbits: dict[tuple[ReducedWord, int], list[Orbit]] = field(default_factory=dict)
-    continua: set[tuple[ReducedWord, int]] = field(default_factory=set)
+    orbits: dict[tuple[ReducedItinerary, int], list[Orbit]] = field(default_factory=dict)
+    continua: set[tuple[ReducedItinerary, int]] = field(default_factory=set)
 
     def __len__(self) -> int:
         return sum(len(found) for found in self.orbits.values())
@@ -42,7 +42,7 @@ class Catalogue:
         """Add an orbit unless it is known, or repeats a shorter one."""
         if shortest(orbit) is not orbit:
             return
-        walk = canonical_pair(orbit.model, orbit.word), orbit.periods
+        walk = canonical_pair(orbit.model, orbit.itinerary), orbit.periods
         found = self.orbits.setdefault(walk, [])
         mirror = orbit.model.symmetry is not None
         if any(stops_distance(orbit.stops, other.stops, mirror) < _SAME for other in found):

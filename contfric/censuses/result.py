@@ -66,7 +66,7 @@ class Census(Shown):
     orbits : tuple of Orbit
         Stable or not, one of each mirror pair, by periods, stops and name.
     walks : tuple of Walk
-        Every closed word over every number of periods, with its fate.
+        Every closed itinerary over every number of periods, with its fate.
     searches : tuple of SectionSearch
         What was done on each section.
     limits : tuple of str
@@ -112,7 +112,7 @@ class Census(Shown):
         return self.orbits[index]
 
     @cached_property
-    def words(self) -> dict[Fate, int]:
+    def itineraries(self) -> dict[Fate, int]:
         """Number of walks by their fate."""
         return {fate: sum(walk.fate is fate for walk in self.walks) for fate in Fate}
 
@@ -160,7 +160,7 @@ class Census(Shown):
             "seed": self.seed,
             "complete": self.complete,
             "orbits": self.records(),
-            "walks": {fate.name: count for fate, count in self.words.items()},
+            "walks": {fate.name: count for fate, count in self.itineraries.items()},
             "searches": [asdict(search) for search in self.searches],
             "limits": list(self.limits),
         }
@@ -182,7 +182,7 @@ class Census(Shown):
 
     def __str__(self) -> str:
         where = ", ".join(f"{k} = {v:g}" for k, v in self.params.items())
-        counts = [f"  {n:>6}  {fate.value}" for fate, n in self.words.items() if n]
+        counts = [f"  {n:>6}  {fate.value}" for fate, n in self.itineraries.items() if n]
         return "\n".join(
             [
                 f"census of {self.model.name} at {where}",

@@ -36,12 +36,12 @@ from contfric.censuses.cells import (
 from contfric.censuses.grid import Grid
 from contfric.censuses.orbits import Catalogue
 from contfric.models.definition import FloatArray
+from contfric.orbit.itineraries import whole_of
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import IntArray, build_system
-from contfric.orbit.words import whole_of
 from contfric.remember.journal import remembered
-from contfric.signature import ReducedWord
+from contfric.signature import ReducedItinerary
 
 Progress = Callable[[str], None]
 #: Largest difference of a return within a cell that Newton is started in: in time (periods), and in
@@ -75,7 +75,7 @@ class Search:
 
     Attributes
     ----------
-    wanted : which walks (word, periods) may have an orbit
+    wanted : which walks (itinerary, periods) may have an orbit
     most : number of starts at which it ends
     jumps, open : discontinuities, and near returns without an orbit, that are left at the smallest size
     """
@@ -191,10 +191,10 @@ class Search:
 
     def _start(self, row: int, walk: Near) -> None:
         codes = tuple(self.grid.code[row, : walk.event + 1].tolist())
-        word = self.grid.word_of(codes)
-        if not self.wanted(whole_of(self.grid.model, word, walk.half), walk.periods):
+        itinerary = self.grid.itinerary_of(codes)
+        if not self.wanted(whole_of(self.grid.model, itinerary, walk.half), walk.periods):
             return
-        root = self._solve(row, walk, word)
+        root = self._solve(row, walk, itinerary)
         _keep(self.roots.setdefault((codes, walk.periods, walk.half), []), root)
 
     # --------------------------------------------------------------------------------- one cell
@@ -204,14 +204,14 @@ class Search:
         cell = int(near.cells[k])
         rows = cells.rows[cell]
         codes = tuple(self.grid.code[rows[0], : near.event + 1].tolist())
-        word = self.grid.word_of(codes)
-        if not self.wanted(whole_of(self.grid.model, word, near.half), near.periods):
+        itinerary = self.grid.itinerary_of(codes)
+        if not self.wanted(whole_of(self.grid.model, itinerary, near.half), near.periods):
             return True
         roots = self.roots.setdefault((codes, near.periods, near.half), [])
         beside = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
         if not beside:
             best = int(rows[np.argmin(np.abs(near.gaps[k]).max(axis=1))])
-            _keep(roots, self._solve(best, near, word))
+            _keep(roots, self._solve(best, near, itinerary))
             beside = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
         if np.abs(near.gaps[k]).max() < _FLAT:
             return True
@@ -238,7 +238,7 @@ class Search:
         line = root.slope * (away - np.rint(away))
         return bool(np.all(np.abs(gaps - line) <= _BENT * np.abs(line) + _ROUNDING))
 
-    def _solve(self, row: int, near: Near, word: ReducedWord) -> Root | None:
+    def _solve(self, row: int, near: Near, itinerary: ReducedItinerary) -> Root | None:
         """Start Newton from a node; the orbit goes to the catalogue, its place on the section back."""
         grid = self.grid
         self.solves += 1
@@ -247,10 +247,10 @@ class Search:
         joints[1:, 0] = grid.time[row] + grid.lift[row, : near.event]
         joints[1:, 1:] = grid.state[row, : near.event]
         joints[:, 0] *= grid.period
-        system = build_system(grid.model, word, near.periods, near.half)
-        orbit = polish(Orbit(system, joints, grid.vector.copy(), np.inf, Status.NOT_CONVERGED))
+        system = build_system(grid.model, itinerary, near.periods, near.half)
+        orbit = refine(Orbit(system, joints, grid.vector.copy(), np.inf, Status.NOT_CONVERGED))
         if orbit.converged:  # after cut corrections the last ones may not have come to rounding
-            orbit = polish(orbit, damped=False)
+            orbit = refine(orbit, damped=False)
         if not orbit.converged or not orbit.admissible:
             return None
         self.catalogue.add(orbit)

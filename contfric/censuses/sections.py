@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from contfric.base.tally import tally
 from contfric.censuses.conditions import Arcs
-from contfric.censuses.words import letters_of, modes_after
+from contfric.censuses.itineraries import letters_of, modes_after
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray, exit_domains, mirror_mode
 from contfric.orbit.tables import tables

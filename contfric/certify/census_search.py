@@ -150,9 +150,9 @@ class _Search:
         return 1 if apart > 0 else -1 if apart < 0 else 0
 
     def _at(self, t: arb, like: Returned) -> list[Returned]:
-        """Return the releases after that in a narrow ball of phases, up to the one with the same word."""
+        """Return the releases after that in a narrow ball of phases, up to the one with the same itinerary."""
         returns = self.follower.follow(Line(arb(t.mid()), arb(t.rad()), arb(0)), splits=False)
-        at = [k for k, r in enumerate(returns) if r.word == like.word]
+        at = [k for k, r in enumerate(returns) if r.itinerary == like.itinerary]
         if not at:
             raise UndecidedError("the segments differ")
         return returns[: at[0] + 1]
@@ -192,7 +192,7 @@ class _Search:
 
     def _orbit(self, zero: _Zero, own: list[int], symmetric: bool) -> ProvedOrbit:
         last = zero.returns[-1]
-        system = build_system(self.model, last.word, 1)
+        system = build_system(self.model, last.itinerary, 1)
         joints = np.array([[t, x, 0.0] for t, x in last.joints])
         near = Orbit(system, joints, self.vector, np.inf)
         settled = settle(near)

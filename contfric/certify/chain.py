@@ -64,17 +64,17 @@ class Segments:
 def segments_of(system: System) -> Segments:
     """Return the chain of a system, with names in the place of its indices."""
     model, layout = system.model, system.layout
-    held = {hold.segment: hold for hold in holds_of(model, system.word)}
+    held = {hold.segment: hold for hold in holds_of(model, system.itinerary)}
     pins: list[str | tuple[str, str] | None] = []
-    for i, (_, _) in enumerate(system.word):
+    for i, (_, _) in enumerate(system.itinerary):
         pin: str | tuple[str, str] | None = None
         if i in held:
-            pin = held[i].pin or (system.word[i - 1][0], system.word[i - 1][1])
+            pin = held[i].pin or (system.itinerary[i - 1][0], system.itinerary[i - 1][1])
         pins.append(pin)
     names = [s.name for s in model.surfaces]
     return Segments(
-        tuple(mode for mode, _ in system.word),
-        tuple("" if i in held else exit_ for i, (_, exit_) in enumerate(system.word)),
+        tuple(mode for mode, _ in system.itinerary),
+        tuple("" if i in held else exit_ for i, (_, exit_) in enumerate(system.itinerary)),
         tuple(pins),
         tuple(names[r] if r >= 0 else "" for r in layout.resets),
         tuple(tuple(float(c) for c in row) for row in layout.closure),

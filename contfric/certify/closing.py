@@ -64,7 +64,7 @@ def keeps(system: System, segments: Segments, model: BallModel, matrices: BallMo
     matrix, image = closure_matrix(segments, model, True), mirror_mode(system.model)
     gaps = [
         matrices.fields[image[mode]] * matrix - matrix * matrices.fields[mode]
-        for mode in {mode for mode, _ in system.word}
+        for mode in {mode for mode, _ in system.itinerary}
     ]
     gaps += [
         matrices.surfaces[to] * matrix - matrices.surfaces[name] * symmetry.sense(name)

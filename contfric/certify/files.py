@@ -65,7 +65,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         "params": orbit.params,
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
-        "segments": [list(pair) for pair in orbit.system.word],
+        "segments": [list(pair) for pair in orbit.system.itinerary],
         "joints": unknowns_of(orbit.joints.ravel().tolist()),
         "radius": radii,
         "enclosure": balls,
@@ -133,7 +133,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "value": value,
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
-        "segments": [list(pair) for pair in orbit.system.word],
+        "segments": [list(pair) for pair in orbit.system.itinerary],
         "knots": [[*unknowns_of(knot[:-1]), knot[-1]] for knot in knots],
         "at": at,
     }

@@ -36,7 +36,7 @@ from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import column
 from contfric.models.definition import FloatArray
 
-Word = tuple[tuple[str, str], ...]
+Itinerary = tuple[tuple[str, str], ...]
 #: Entries of the extended state: displacement and velocity.
 _X, _V = 0, 1
 #: Steps of a period in which the end of a segment is looked for, and how far beyond the period.
@@ -60,7 +60,7 @@ class Stretch:
     time : when it starts
     state : the extended state there
     change : derivatives (dt, dx) of time and place of the start by the phase of the release
-    word : segments since the release
+    itinerary : segments since the release
     joints : times and displacements where these began, for the middle of the interval
     smooth : whether the start is a smooth function of the phase
     begins : whether v and its rate vanish at the start (2), or v only (1)
@@ -70,7 +70,7 @@ class Stretch:
     time: Line
     state: Affine
     change: tuple[arb, arb]
-    word: Word = ()
+    itinerary: Itinerary = ()
     joints: tuple[tuple[float, float], ...] = ()
     smooth: bool = True
     begins: int = 1
@@ -86,14 +86,14 @@ class Returned:
     time : when it is
     apart : how much later than a period after the first one
     slope : derivative of its time by the phase of the first release; a ball over the interval
-    word, joints, smooth : see :class:`Stretch`
+    itinerary, joints, smooth : see :class:`Stretch`
     """
 
     surface: str
     time: Line
     apart: Line
     slope: arb
-    word: Word
+    itinerary: Itinerary
     joints: tuple[tuple[float, float], ...]
     smooth: bool
 
@@ -169,7 +169,9 @@ class Follower:
 
     def _returned(self, end: Stretch, exit_: str, phase: Line) -> Returned:
         apart = end.time - Line(phase.at + self.balls.period, phase.slope, phase.rest)
-        return Returned(exit_, end.time, apart, end.change[0], end.word, end.joints, end.smooth)
+        return Returned(
+            exit_, end.time, apart, end.change[0], end.itinerary, end.joints, end.smooth
+        )
 
     # ------------------------------------------------------------------ one segment
 
@@ -270,10 +272,10 @@ class Follower:
     ) -> list[tuple[str, str, Stretch]]:
         """Return what starts at the end of a segment, by the law."""
         state = with_zero(state, _V)
-        word = (*stretch.word, (stretch.mode, exit_))
+        itinerary = (*stretch.itinerary, (stretch.mode, exit_))
         middle = float(stretch.time.at.mid()), float(stretch.state.at[_X, 0].mid())
         joints = (*stretch.joints, middle)
-        base = Stretch("stick", time, state, change, word, joints, stretch.smooth)
+        base = Stretch("stick", time, state, change, itinerary, joints, stretch.smooth)
         if stretch.mode == "stick":
             slide = _SLIDES[-_LIMIT[exit_]]
             return [(stretch.mode, exit_, replace(base, mode=slide, begins=self._released))]

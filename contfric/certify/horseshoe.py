@@ -158,11 +158,11 @@ def _crossings(
 def _image(returns: ReturnMap, n: int, a: float, b: float) -> tuple[arb, object]:
     """Return f^n of the phases between two (an elapsed time), and the segments on the way."""
     middle, half = (arb(a) + arb(b)) / 2, (arb(b) - arb(a)) / 2
-    line, words = Line(middle, half, arb(0)), []
+    line, itineraries = Line(middle, half, arb(0)), []
     for _ in range(n):
-        line, word = returns.follow(line)
-        words.append(word)
-    return line.whole, tuple(words)
+        line, itinerary = returns.follow(line)
+        itineraries.append(itinerary)
+    return line.whole, tuple(itineraries)
 
 
 def _covering(
@@ -176,24 +176,24 @@ def _covering(
         If it is not proved.
     """
     (a, b), period = interval, returns.balls.period
-    (first, words), (last, others) = (_image(returns, n, t, t) for t in interval)
+    (first, itineraries), (last, others) = (_image(returns, n, t, t) for t in interval)
     turns = round(float(((first + last) / 2 - arb(sum(window)) / 2).mid() / float(period.mid())))
     low, high = (arb(c) + turns * period for c in window)
     covers = (first < low and last > high) or (last < low and first > high)
-    if not covers or words != others:
+    if not covers or itineraries != others:
         raise UndecidedError("the images of the ends of an interval do not enclose the window")
     waiting, pieces = [(a, b)], 0
     while waiting:
         left, right = waiting.pop()
         try:
-            _, word = _image(returns, n, left, right)
+            _, itinerary = _image(returns, n, left, right)
         except UndecidedError as error:
             if right - left < _SHORTEST * (b - a):
                 raise UndecidedError(f"between {left:.9g} and {right:.9g}: {error}") from None
             middle = (left + right) / 2
             waiting += [(middle, right), (left, middle)]
             continue
-        if word != words:
+        if itinerary != itineraries:
             raise UndecidedError("the map may have a jump within an interval")
         pieces += 1
     return pieces

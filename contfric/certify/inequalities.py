@@ -74,7 +74,7 @@ class Inequality:
         """Return the finding with its place in words."""
         if self.finding.proved:
             return self.finding
-        mode = system.word[self.segment][0]
+        mode = system.itinerary[self.segment][0]
         text = f"segment {self.segment + 1} ({mode}): {self.what} at {self.surface}: {self.finding.why}"
         return Finding(self.finding.verdict, text)
 

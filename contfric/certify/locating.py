@@ -1,6 +1,6 @@
 """Where an event happens: on the shortest problem that its orbit solves, and what vanishes there.
 
-A stick that has shrunk to nothing at the event is taken out of the word, and an orbit that is its own
+A stick that has shrunk to nothing at the event is taken out of the itinerary, and an orbit that is its own
 mirror image is solved on its half: so a symmetric pair of stops that meet their limits together is one
 condition and not two.
 """
@@ -15,10 +15,10 @@ from contfric.certify.extended import Condition
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.itineraries import half_of
 from contfric.orbit.margins import Margin, Test
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import build_system
-from contfric.orbit.words import half_of
 
 #: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.
 _VANISHED = 1e-7
@@ -79,21 +79,21 @@ def _released(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, tuple[Test,
     A hold that is pinned to the limit of rest and is left on it again: a bridge ends there. What is left
     of it is that the stop before lies on the limit. Other holds stay what they are.
     """
-    word, moved = list(orbit.system.word), []
+    itinerary, moved = list(orbit.system.itinerary), []
     for test in tests:
         hold = next((h for h in orbit.system.holds if h.segment == test.segment), None)
         if hold is None:
             moved.append(test)
         elif hold.pin == test.surface and test.margin is Margin.JOINT:
-            word[hold.segment] = (word[hold.segment][0], test.surface)
+            itinerary[hold.segment] = (itinerary[hold.segment][0], test.surface)
             moved.append(Test(Margin.JOINT, hold.segment - 1, test.surface))
         else:
             raise NotLocatedError(
                 "a hold that ends in another way than by its release is not proved"
             )
-    if tuple(word) == orbit.system.word:
+    if tuple(itinerary) == orbit.system.itinerary:
         return orbit, tests
-    system = build_system(orbit.model, tuple(word), orbit.system.periods, orbit.system.half)
+    system = build_system(orbit.model, tuple(itinerary), orbit.system.periods, orbit.system.half)
     return replace(orbit, system=system), tuple(moved)
 
 
@@ -115,15 +115,15 @@ def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]
     whole, model = orbit.as_whole(), orbit.model
     lasts = whole.ends[:, 0] - whole.cycle[:, 0]
     kept = [i for i, duration in enumerate(lasts) if duration > _VANISHED]
-    word = tuple(whole.word[i] for i in kept)
+    itinerary = tuple(whole.itinerary[i] for i in kept)
     joints = whole.cycle[kept]
-    half = half_of(model, word, whole.periods)
+    half = half_of(model, itinerary, whole.periods)
     if half is not None and _is_symmetric(model, joints, whole.period):
-        word, joints = half, joints[: len(half)]
+        itinerary, joints = half, joints[: len(half)]
     else:
         half = None
     try:
-        system = build_system(model, word, whole.periods, half=half is not None)
+        system = build_system(model, itinerary, whole.periods, half=half is not None)
     except (KeyError, ValueError) as error:
         raise NotLocatedError(f"no orbit is left without the vanished segments ({error})") from None
     found: list[Test] = []
@@ -158,7 +158,7 @@ def _tangency(orbit: Orbit, test: Test) -> Location:
     for name in names:
         gap, after = _nearest_touch(orbit, test.segment, name)
         found.append((gap, Condition(test.segment, name, within=True), after))
-        if name != orbit.system.word[test.segment][1]:
+        if name != orbit.system.itinerary[test.segment][1]:
             value = orbit.flow.observe(
                 model.surface_by_name[name].observable, float(end[0]), end[1:]
             )
@@ -173,7 +173,7 @@ def _nearest_touch(orbit: Orbit, segment: int, surface: str) -> tuple[float, flo
     duration = float(orbit.ends[segment, 0] - orbit.cycle[segment, 0])
     observable = orbit.model.surface_by_name[surface].observable
     times, values = orbit.flow.stationary(
-        orbit.system.word[segment][0], observable, float(start[0]), start[1:], duration
+        orbit.system.itinerary[segment][0], observable, float(start[0]), start[1:], duration
     )
     gaps = np.abs(values - orbit.flow.level(surface))
     if not len(gaps):

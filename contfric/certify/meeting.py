@@ -102,7 +102,7 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
         joints, known = [*joints, *image], [*known, *([closing(r) for r in rows] for rows in known)]
-        modes = [mode for mode, _ in orbit.word]
+        modes = [mode for mode, _ in orbit.itinerary]
         resets = list(segments_of(orbit.as_whole().system).resets)
         turn = 2 * turn
     return _Cycle(joints, modes, resets, known, turn, orbit.periods)

@@ -68,13 +68,13 @@ class ReturnMap:
             If it is not proved.
         """
         state = released(self.balls, (self.release.surface, self.release.rests), phase)
-        word, lasts = self._simulated(phase.at, state)
+        itinerary, lasts = self._simulated(phase.at, state)
         time, joints = phase, [self._joint(phase, state)]
-        for (mode, exit_), last in zip(word, lasts, strict=True):
+        for (mode, exit_), last in zip(itinerary, lasts, strict=True):
             after, state = ended(self.balls, mode, exit_, state, last)
             time = time + after
             joints.append(self._joint(time, state))
-        system = self._system(word)
+        system = self._system(itinerary)
         segments = segments_of(system)
         chain = Chain(segments, self.balls)
         closing = closing_of(segments, self.balls, system.half)
@@ -82,17 +82,17 @@ class ReturnMap:
             if not found.finding.proved:
                 raise UndecidedError(str(found.named(system)))
         shift = self.balls.period / 2 if system.half else arb(0)
-        return Line(time.at - shift, time.slope, time.rest), word
+        return Line(time.at - shift, time.slope, time.rest), itinerary
 
-    def _system(self, word: tuple[tuple[str, str], ...]) -> System:
-        if word not in self.systems:
-            half = word[-1][1] != self.release.surface
-            system = build_system(self.model, word, 1, half)
+    def _system(self, itinerary: tuple[tuple[str, str], ...]) -> System:
+        if itinerary not in self.systems:
+            half = itinerary[-1][1] != self.release.surface
+            system = build_system(self.model, itinerary, 1, half)
             segments = segments_of(system)
             if half and not keeps(system, segments, self.balls, self.balls):
                 raise UndecidedError("the symmetry is not exact")
-            self.systems[word] = system
-        return self.systems[word]
+            self.systems[itinerary] = system
+        return self.systems[itinerary]
 
     def _joint(self, time: Line, state: Affine) -> Vector:
         return [time.whole, *numbers(state.whole)[: self.balls.states]]
@@ -117,7 +117,7 @@ class ReturnMap:
         )
         ends = [start, *(found.cycles * period + found.times).tolist()]
         lasts = np.diff(ends).tolist()
-        for k, (mode, exit_) in enumerate(found.word):
+        for k, (mode, exit_) in enumerate(found.itinerary):
             if mode == release.mode and exit_ in (release.surface, release.image):
-                return found.word[: k + 1], lasts[: k + 1]
+                return found.itinerary[: k + 1], lasts[: k + 1]
         raise UndecidedError("no release follows in the simulation")

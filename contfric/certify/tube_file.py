@@ -172,7 +172,7 @@ def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str
 
 def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
     branch, runs, run = proof.branch, list[_Run](), None
-    size = len(branch.system.word) * branch[0].joints.shape[1] + 1
+    size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
     kept, zeta = _kept(branch), branch.parameter == "zeta"
     for k, piece in enumerate(proof.pieces):
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
@@ -215,7 +215,7 @@ def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
         "parameter": branch.parameter,
         "periods": branch[0].periods,
         "half": bool(system.half),
-        "segments": [list(pair) for pair in system.word],
+        "segments": [list(pair) for pair in system.itinerary],
         "knots": run.rows if run else [],
         "events": [[k, kind] for k, found in enumerate(kinds) for kind in found],
         "ends": run.ends if run else [None, None],
@@ -254,13 +254,15 @@ def _ends(proof: BranchCertificate, piece: Piece) -> list[list[Any]]:
 
 
 def _places(proof: BranchCertificate, piece: Piece, label: str) -> list[list[Any]]:
-    """Return what vanishes in the words of the checker: loads at stops, or what is touched and when."""
+    """Return what vanishes in the itineraries of the checker: loads at stops, or what is touched and when."""
     system, found = proof.branch.system, list[list[Any]]()
     for name in piece.ends:
         i, level = name.segment, 1 if name.surface == "F+" else -1
         if name.what == DURATION:  # the load at the stop before
-            level = (-1 if system.half and i == 0 else 1) * (1 if system.word[i][1] == "F+" else -1)
-            i = (i - 1) % len(system.word)
+            level = (-1 if system.half and i == 0 else 1) * (
+                1 if system.itinerary[i][1] == "F+" else -1
+            )
+            i = (i - 1) % len(system.itinerary)
         if name.what in (JOINT, DURATION) and [i, level] not in found:
             found.append([i, level])
     own = next((p for p in proof.proofs if p.event.label == label), None)

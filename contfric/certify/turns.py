@@ -139,7 +139,7 @@ def _places(
                 off - shift,
                 *(a - arb(float(b)) for a, b in zip(z[1:], joint[1:], strict=True)),
             ]
-            same = system.word[k] == pair.system.word[i]
+            same = system.itinerary[k] == pair.system.itinerary[i]
             if same and all(abs(float(g.mid())) < _NEAR for g in gaps):
                 found.append((k, shift))
                 break

@@ -108,7 +108,7 @@ def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: 
 
 
 @helper
-def polish(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
+def refine(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
     """Move ``walk.y`` to the equilibrium of a mode near it, where there is one and no continuum."""
     n = walk.y.shape[0]
     for _ in range(_CORRECTIONS):
@@ -134,7 +134,7 @@ def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, c
     matrix has its exponents, and none are written.
     """
     n = walk.y.shape[0]
-    polish(functions, mode, t, p, walk, cycle, rows)
+    refine(functions, mode, t, p, walk, cycle, rows)
     write_rates(functions, ranks[mode] + 1, mode, t, p, walk, cycle, rows, cell)
     if not rows.exponents[cell, 0] <= _ATTRACTS:
         return False

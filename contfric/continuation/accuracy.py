@@ -29,7 +29,7 @@ from contfric.continuation.zero_acceleration import joint_within, stationary_val
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import linearised
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import Margin, Test
 
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
@@ -329,7 +329,7 @@ def _miss(kind: Kind, here: Orbit, active: int, distance: float, clear: float) -
     for k in _NEIGHBOURS:
         vector = here.vector.copy()
         vector[active] += k * distance
-        orbit = polish(replace(here, vector=vector), damped=False)
+        orbit = refine(replace(here, vector=vector), damped=False)
         if not orbit.converged:
             return None
         shifts.append(float(vector[active] - here.vector[active]))

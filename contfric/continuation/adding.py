@@ -1,16 +1,16 @@
-"""Period adding: words over the two orbits that a bridge joins.
+"""Period adding: itineraries over the two orbits that a bridge joins.
 
 Where a branch a ends at SS and, beyond a gap in the parameter, a branch b of the other outcome begins,
 the return map of the stop has a jump: above it a turn follows a, below it b. In between live orbits of
-several turns, each of which follows one of the two, ``a-b``, ``a-b-b`` and so on; which words there are
+several turns, each of which follows one of the two, ``a-b``, ``a-b-b`` and so on; which itineraries there are
 follows the arithmetic of a circle map (period adding: V. Avrutin et al., Continuous and Discontinuous
 Piecewise-Smooth One-Dimensional Maps, World Scientific 2019, chapter 3).
 
-Words that the return map of the release excludes are not tried (:mod:`contfric.continuation.itineraries`).
+Itineraries that the return map of the release excludes are not tried (:mod:`contfric.continuation.itineraries`).
 
-Each word is an ordinary boundary-value problem, solved from the two orbits run through one after the
+Each itinerary is an ordinary boundary-value problem, solved from the two orbits run through one after the
 other: at the pinned stop their states nearly agree. The problem has a solution also where it is not
-admissible, so the window of a word is bounded by the parameters at which one of its stops meets the
+admissible, so the window of an itinerary is bounded by the parameters at which one of its stops meets the
 surface, and these are found by bracketing the zeros of the margins.
 """
 
@@ -26,21 +26,21 @@ from contfric.base.shown import Shown
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import Bifurcation
-from contfric.continuation.itineraries import words_with_ranges
+from contfric.continuation.itineraries import itineraries_with_ranges
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.prescribed import follow_word
-from contfric.orbit.solve import polish
+from contfric.orbit.prescribed import follow_itinerary
+from contfric.orbit.solve import refine
 from contfric.orbit.system import Margin, build_system
 from contfric.signature.edits import concatenate
 
-#: Places over the gap at which the margins of a word are looked at: they are smooth curves there, with a
-#: few changes of sign for a word of six turns.
+#: Places over the gap at which the margins of an itinerary are looked at: they are smooth curves there, with a
+#: few changes of sign for an itinerary of six turns.
 _GRID = 48
-#: Rounds of the motion before Newton: a stable word contracts the error of 1e-3 to far below the length
+#: Rounds of the motion before Newton: a stable itinerary contracts the error of 1e-3 to far below the length
 #: of its sticks.
 _ROUNDS = 4
 #: Steps towards one change of sign, and the resolution of its place: the method needs about ten.
@@ -49,16 +49,16 @@ _MOST_STEPS, _RESOLUTION = 60, 1e-15
 
 @dataclass(frozen=True, eq=False)
 class Window(Shown):
-    """The orbits of one word, from one end of its window to the other.
+    """The orbits of one itinerary, from one end of its window to the other.
 
     Attributes
     ----------
-    word : str
+    itinerary : str
         The orbits that follow each other, such as ``1a-1a-2a``.
     turns : str
         The same in letters, a and b.
     branch : Branch
-        The branch of the word; its range is the window.
+        The branch of the itinerary; its range is the window.
 
     Examples
     --------
@@ -67,11 +67,11 @@ class Window(Shown):
     >>> found = cf.explore(orbit, "Omega", (0.48, 0.55))
     >>> bridge = next(branch for branch in found.branches if branch.bridge)
     >>> window = cf.period_adding(bridge, longest=2)[0]
-    >>> window.word, round(window.range[0], 6)
+    >>> window.itinerary, round(window.range[0], 6)
     ('1a-2a', 0.491752)
     """
 
-    word: str
+    itinerary: str
     turns: str
     branch: Branch
 
@@ -83,24 +83,26 @@ class Window(Shown):
     def __repr__(self) -> str:
         low, high = self.range
         stable = "stable" if np.all(self.branch.stable) else "in part unstable"
-        return f"<{self.word}: {self.branch.parameter} from {low:.13g} to {high:.13g}, {stable}>"
+        return (
+            f"<{self.itinerary}: {self.branch.parameter} from {low:.13g} to {high:.13g}, {stable}>"
+        )
 
 
 def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
-    """Return the windows of all words over the two orbits that a bridge joins, in order.
+    """Return the windows of all itineraries over the two orbits that a bridge joins, in order.
 
     Parameters
     ----------
     bridge : Branch
         A bridge between two SS ends, from :func:`contfric.explore`.
     longest : int
-        Most turns of a word. The time doubles with each turn more where all words have to be tried
+        Most turns of an itinerary. The time doubles with each turn more where all itineraries have to be tried
         (docs/bridges.md, several periods).
 
     Returns
     -------
     tuple of Window
-        In the order of the parameter; words that have no admissible orbit are left out.
+        In the order of the parameter; itineraries that have no admissible orbit are left out.
 
     Raises
     ------
@@ -113,7 +115,7 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     >>> found = cf.explore(orbit, "Omega", (0.48, 0.55))
     >>> bridge = next(branch for branch in found.branches if branch.bridge)
-    >>> [window.word for window in cf.period_adding(bridge, longest=3)]
+    >>> [window.itinerary for window in cf.period_adding(bridge, longest=3)]
     ['1a-2a-2a', '1a-2a', '1a-1a-2a']
     """
     whole_number("longest", longest, least=2)
@@ -137,7 +139,7 @@ def period_adding(bridge: Branch, longest: int = 6) -> tuple[Window, ...]:
     grid = np.linspace(low, high, _GRID + 2)[1:-1]
     windows = [
         window
-        for turns, near in words_with_ranges(letters, bridge, grid, longest)
+        for turns, near in itineraries_with_ranges(letters, bridge, grid, longest)
         if (window := _window(turns, letters, bridge, near)) is not None
     ]
     return tuple(sorted(windows, key=lambda w: w.range))
@@ -168,13 +170,13 @@ def _from_stop(orbit: Orbit, bridge: Branch) -> Orbit:
         + np.abs(end[1:] - near[1:]).max()
         for end in orbit.ends
     ]
-    slides = [i for i, (mode, _) in enumerate(orbit.word) if not _rests(orbit, mode)]
+    slides = [i for i, (mode, _) in enumerate(orbit.itinerary) if not _rests(orbit, mode)]
     stop = min(slides, key=lambda i: apart[i])
-    word = orbit.word[stop:] + orbit.word[:stop]
+    itinerary = orbit.itinerary[stop:] + orbit.itinerary[:stop]
     joints = np.concatenate([orbit.cycle[stop:], orbit.cycle[:stop]])
     joints[len(joints) - stop :, 0] += orbit.period
     joints[:, 0] -= np.round((orbit.ends[stop, 0] - near[0]) / period) * period
-    system = build_system(orbit.model, word, orbit.periods)
+    system = build_system(orbit.model, itinerary, orbit.periods)
     return replace(orbit, system=system, joints=joints)
 
 
@@ -185,7 +187,7 @@ def _rests(orbit: Orbit, mode: str) -> bool:
 def _window(
     turns: str, letters: dict[str, Orbit], bridge: Branch, grid: FloatArray
 ) -> Window | None:
-    """Return the window of a word over some parameters, None if it has none."""
+    """Return the window of an itinerary over some parameters, None if it has none."""
     start = _in_turn([letters[letter] for letter in turns])
     low, high = _bounds(start, turns, letters, bridge, grid)
     if not low < high:
@@ -212,27 +214,27 @@ def _in_turn(orbits: list[Orbit]) -> Orbit:
         shifted[:, 0] += periods * orbit.period / orbit.periods
         joints.append(shifted)
         periods += orbit.periods
-    word = concatenate(*(orbit.system.word for orbit in orbits))
-    system = build_system(orbits[0].model, word, periods)
+    itinerary = concatenate(*(orbit.system.itinerary for orbit in orbits))
+    system = build_system(orbits[0].model, itinerary, periods)
     vector = orbits[0].vector.copy()
     return Orbit(system, np.concatenate(joints), vector, np.inf, Status.NOT_CONVERGED)
 
 
 def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
-    """Return the orbit of a word at a parameter.
+    """Return the orbit of an itinerary at a parameter.
 
     Newton alone may take the wrong root where a stick of a turn is short: its load falls through the
     limit before it grows through it. So the joints are first those of the motion itself.
     """
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(parameter)] = value
-    return polish(_settled(replace(orbit, vector=vector)))
+    return refine(_settled(replace(orbit, vector=vector)))
 
 
 def _settled(orbit: Orbit) -> Orbit:
     """Return an orbit with the joints of the motion that takes its outcomes, after some rounds."""
     joints, end, system = orbit.joints.copy(), np.empty(orbit.joints.shape[1]), orbit.system
-    found = follow_word(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)
+    found = follow_itinerary(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)
     return replace(orbit, joints=joints) if found else orbit
 
 
@@ -242,7 +244,7 @@ def _bounds(
     """Return the range in which every turn follows its letter: its stops have positive margins.
 
     The margins change sign where a stop meets the surface; between two such places that follow each
-    other all of them keep their signs. At the ends of the bridge sticks of length zero solve every word.
+    other all of them keep their signs. At the ends of the bridge sticks of length zero solve every itinerary.
     """
     stops = list(_stops(start, turns, letters, bridge))
     rows = np.array([_margins(start, bridge.parameter, x, stops) for x in grid])

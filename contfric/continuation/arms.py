@@ -25,7 +25,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import System
 
 #: A singular value this small (relative to the largest) is zero at a fold: the length of a hold is known
@@ -37,7 +37,7 @@ _OTHER_SIDE = 0.5
 
 def passages(system: System) -> list[list[int]]:
     """Return the joints that follow from each hold: from its end to the start of the next one."""
-    count, starts = len(system.word), [hold.segment for hold in system.holds]
+    count, starts = len(system.itinerary), [hold.segment for hold in system.holds]
     ahead = [*starts[1:], starts[0] + count] if starts else []
     return [
         [j % count for j in range(start + 1, after + 1)]
@@ -100,7 +100,7 @@ class Arms:
         active = fold.model.index_of(settings.parameter)
         longer = point.orbit(fold.system, fold.vector, active)
         guess = replace(longer, joints=2.0 * fold.joints - longer.joints)
-        shorter = polish(replace(guess, residual=np.inf), damped=False)
+        shorter = refine(replace(guess, residual=np.inf), damped=False)
         if not (longer.converged and shorter.converged):
             return None
         ends = [passages(fold.system)[hold][0] for hold in self.turning]
@@ -126,11 +126,11 @@ class Arms:
             unit, hold = divmod(number, own)
             if hold in self.turning and sequence[unit] >> short.index(hold) & 1:
                 joints[places] = other[places]
-        return polish(replace(orbit, joints=joints, residual=np.inf), damped=False)
+        return refine(replace(orbit, joints=joints, residual=np.inf), damped=False)
 
     def _repeated(self, orbit: Orbit, count: int) -> Orbit:
         unit = replace(self.unit, vector=orbit.vector, duration=orbit.turn)
-        form = Form(orbit.system.word, orbit.joints, np.zeros(len(orbit.joints)), "", unit)
+        form = Form(orbit.system.itinerary, orbit.joints, np.zeros(len(orbit.joints)), "", unit)
         return unit.orbit((form,) * count)[0]
 
 
@@ -141,7 +141,7 @@ def arms_at(orbit: Orbit) -> Arms | None:
     whole = orbit.as_whole()
     unit = unit_of(whole)
     try:
-        form = form_of(whole, np.zeros(len(whole.word)), unit, pieces(whole, unit)[0], "")
+        form = form_of(whole, np.zeros(len(whole.itinerary)), unit, pieces(whole, unit)[0], "")
         fold = form.orbit
     except (NotationError, ValueError):
         return None

@@ -1,4 +1,4 @@
-"""A branch: the points of one reduced word along a parameter, its bifurcations and its ends."""
+"""A branch: the points of one reduced itinerary along a parameter, its bifurcations and its ends."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from contfric.base.shown import Shown
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.itineraries import mirror_pairs, mirrored_labels
 from contfric.orbit.linear import of_two_halves
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
-from contfric.orbit.words import mirror_pairs, mirrored_labels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +35,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Branch(Shown):
-    """A family of orbits of one reduced word, from one end to the other.
+    """A family of orbits of one reduced itinerary, from one end to the other.
 
     Attributes
     ----------
@@ -214,7 +214,7 @@ class Branch(Shown):
         x = self.joints[:, :, 1]
         closed = self.joints[:, 0, 1:] @ self.system.layout.closure.T
         ends = np.concatenate([x[:, 1:], closed[:, :1]], axis=1)
-        at = stopping_segments(self.model, self.system.word)
+        at = stopping_segments(self.model, self.system.itinerary)
         if not self.system.half:
             return ends[:, at]
         mirrored = (self.joints[:, :, 1:] @ self.system.layout.closure.T)[:, :, 0]
@@ -258,8 +258,8 @@ class Branch(Shown):
             raise ParameterError(
                 f"model '{self.model.name}' has no symmetry: a branch has no mirror image"
             )
-        word = mirror_pairs(self.model, self.system.word)
-        system = build_system(self.model, word, self.system.periods, self.system.half)
+        itinerary = mirror_pairs(self.model, self.system.itinerary)
+        system = build_system(self.model, itinerary, self.system.periods, self.system.half)
         joints = self.joints.copy()
         joints[:, :, 1:] = joints[:, :, 1:] @ symmetry.array().T
         if not self.model.autonomous:

@@ -1,6 +1,6 @@
-"""Candidates for what follows a sliding event: orbits of other words, at the event itself.
+"""Candidates for what follows a sliding event: orbits of other itineraries, at the event itself.
 
-The motion at the event solves the equations of several words (:mod:`contfric.continuation.incident`), over
+The motion at the event solves the equations of several itineraries (:mod:`contfric.continuation.incident`), over
 one period or several (:mod:`contfric.continuation.sequences`). Each is a candidate, unless the local
 conditions exclude it (:mod:`contfric.continuation.conditions`). The segments that come in have length zero,
 and those that are held have their pins.
@@ -23,12 +23,12 @@ from contfric.continuation.unit import Form, Unit
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
+from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
 from contfric.orbit.slides import SAME_MOTION
-from contfric.orbit.system import Word, build_system
-from contfric.orbit.words import half_of
+from contfric.orbit.system import Itinerary, build_system
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +38,11 @@ class Candidate:
     Attributes
     ----------
     reason : what would happen there, in words
-    orbit : the orbit at the event, of the new word; None if there is no such word
+    orbit : the orbit at the event, of the new itinerary; None if there is no such itinerary
     refusal : why there is no orbit
     away : how its joints move where it is singular at the event and has to start near it; else None
     rest : whether that is because nothing moves any more
-    words : of the units that it consists of
+    itineraries : of the units that it consists of
     """
 
     reason: str
@@ -50,7 +50,7 @@ class Candidate:
     refusal: str = ""
     away: FloatArray | None = None
     rest: bool = False
-    words: frozenset[Word] = frozenset()
+    itineraries: frozenset[Itinerary] = frozenset()
 
     @property
     def has_hold(self) -> bool:
@@ -130,14 +130,14 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
         orbit, away = unit.orbit(forms) if others else (form.orbit, form.away)
     except NotationError as error:
         return Candidate(reason, None, str(error))
-    words = frozenset(form.word for form in forms)
+    itineraries = frozenset(form.itinerary for form in forms)
     if not np.any(away):
         plain = canonical(orbit)  # joints on sections are of no use beside others
         orbit = plain.as_half() if orbit.system.half and plain is not orbit else plain
-        return Candidate(reason, orbit, words=words)
+        return Candidate(reason, orbit, itineraries=itineraries)
     moves = np.zeros(orbit.joints.shape)
     moves[:, 0] = away
-    return Candidate(reason, orbit, away=moves, words=words)
+    return Candidate(reason, orbit, away=moves, itineraries=itineraries)
 
 
 def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> str:
@@ -154,7 +154,7 @@ def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> s
 
 
 def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArray | None]:
-    """Return the same motion as an orbit of the edited word, on its half if it is symmetric.
+    """Return the same motion as an orbit of the edited itinerary, on its half if it is symmetric.
 
     And how its joints move away from the event, shape (N, 1 + n), where it is singular there.
 
@@ -164,7 +164,7 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
         If the transition graph has no such walk.
     """
     edited, moves = edited_whole(orbit, outcomes)
-    half = half_of(edited.model, edited.word, edited.periods)
+    half = half_of(edited.model, edited.itinerary, edited.periods)
     if half is not None and edited.mirror_distance <= SAME_MOTION:
         part = build_system(edited.model, half, edited.periods, half=True)
         end = float(edited.joints[len(half), 0])

@@ -1,11 +1,11 @@
 """What follows an event of a structure with many contacts, where nothing jumps.
 
-The states of the contacts compose, so that the word behind an event follows from that before it. Where rest
+The states of the contacts compose, so that the itinerary behind an event follows from that before it. Where rest
 is left without acceleration (:attr:`contfric.models.definition.Model.filippov`) the solution is continuous,
 and there are four cases:
 
 =====================================  =================================================================
-event, at the place                    edit of the word
+event, at the place                    edit of the itinerary
 =====================================  =================================================================
 two contacts change at once            they change in the other order
 a surface is touched inside            split it there: the contact changes its state, for no time
@@ -50,8 +50,8 @@ def continuous_edit(orbit: Orbit, place: Test) -> tuple[Edit, Joints, Speeds, st
     NotationError
         If nothing follows from this place: the reason says why.
     """
-    word, i = orbit.word, place.segment
-    if is_hold(word[i][1]):
+    itinerary, i = orbit.itinerary, place.segment
+    if is_hold(itinerary[i][1]):
         raise NotationError(f"segment {i + 1} is a hold: where nothing jumps there is none")
     if place.margin is Margin.JOINT:
         return _two_at_once(orbit, i, place.surface)
@@ -62,22 +62,22 @@ def continuous_edit(orbit: Orbit, place: Test) -> tuple[Edit, Joints, Speeds, st
 
 def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where two surfaces are met at once: of one contact, or of two."""
-    model, word = orbit.model, orbit.word
-    (mode, first), (_, second) = word[i], word[(i + 1) % len(word)]
+    model, itinerary = orbit.model, orbit.itinerary
+    (mode, first), (_, second) = itinerary[i], itinerary[(i + 1) % len(itinerary)]
     joints: Joints = {(i, 0): orbit.ends[i]}
     if isinstance(model, ComposedModel) and model.composition.structure.coupled:
         return _sharing(orbit, model, i, surface)
     if not any(through == surface for through, _ in model.exits_of(mode)):
-        edit = swap_edit(word, {i: surface}, model)
+        edit = swap_edit(itinerary, {i: surface}, model)
         return edit, joints, {}, f"swap stick and reversal at stop {i + 1}, at {surface}"
-    after = word[(i + 2) % len(word)][0]
+    after = itinerary[(i + 2) % len(itinerary)][0]
     others = [m for through, m in model.exits_of(mode) if through == surface]
     ways = [m for m in others if after in model.targets.get((m, first), ())]
-    if second != surface or not ways or _lasts(orbit, (i + 1) % len(word)):
+    if second != surface or not ways or _lasts(orbit, (i + 1) % len(itinerary)):
         raise NotationError(
             f"{surface} and {first} are met at once, and do not change places there"
         )
-    edit = Edit(frozenset({(i + 1) % len(word)}), {i: surface}, {i: ((ways[0], first),)})
+    edit = Edit(frozenset({(i + 1) % len(itinerary)}), {i: surface}, {i: ((ways[0], first),)})
     return edit, joints, {}, f"{surface} is met before {first} at the end of segment {i + 1}"
 
 
@@ -85,15 +85,17 @@ def _sharing(
     orbit: Orbit, model: ComposedModel, i: int, surface: str
 ) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where two surfaces are met at once, of contacts that share loads or of others."""
-    word, joints = orbit.word, {(i, k): orbit.ends[i] for k in range(2)}
-    short = [not _lasts(orbit, (i + 1 + k) % len(word)) for k in range(min(2, len(word) - 2))]
-    limit = limit_behind(model, word, i, surface)
+    itinerary, joints = orbit.itinerary, {(i, k): orbit.ends[i] for k in range(2)}
+    short = [
+        not _lasts(orbit, (i + 1 + k) % len(itinerary)) for k in range(min(2, len(itinerary) - 2))
+    ]
+    limit = limit_behind(model, itinerary, i, surface)
     if limit is not None:
-        edit, reason = with_other_state(model, word, i, limit, vanishes=any(short[:1]))
+        edit, reason = with_other_state(model, itinerary, i, limit, vanishes=any(short[:1]))
     else:
         count = next((k for k, is_short in enumerate(short) if not is_short), len(short))
-        edit = in_other_order(model, word, i, surface, count)
-        reason = f"{surface} is met before {word[i][1]} at the end of segment {i + 1}"
+        edit = in_other_order(model, itinerary, i, surface, count)
+        reason = f"{surface} is met before {itinerary[i][1]} at the end of segment {i + 1}"
     if edit.inserted and not edit.dropped and not _lasts(orbit, i):
         raise NotationError(f"segment {i + 1} has no length: nothing comes in behind it")
     used = len(edit.inserted.get(i, ()))
@@ -102,7 +104,7 @@ def _sharing(
 
 def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where a surface is touched inside: the contact changes its state, for no time."""
-    model, (mode, exit_) = orbit.model, orbit.word[i]
+    model, (mode, exit_) = orbit.model, orbit.itinerary[i]
     touch = touch_of(orbit, i, surface)
     other, back = _there_and_back(model, mode, surface)
     edit = split(i, surface, (other, back), (mode, exit_))
@@ -126,11 +128,11 @@ def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
 
 def _vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where a state of a contact has no length any more: the contact does not change."""
-    word, n = orbit.word, len(orbit.word)
+    itinerary, n = orbit.itinerary, len(orbit.itinerary)
     for k in (i, (i + 1) % n):
         before, behind = (k - 1) % n, (k + 1) % n
-        if n > 2 and word[before][0] == word[behind][0] and not _lasts(orbit, k):
-            edit = Edit(frozenset({k, behind}), {before: word[behind][1]})
+        if n > 2 and itinerary[before][0] == itinerary[behind][0] and not _lasts(orbit, k):
+            edit = Edit(frozenset({k, behind}), {before: itinerary[behind][1]})
             return edit, {}, {}, f"segment {k + 1} vanishes"
     raise NotationError(f"segment {i + 1} ends tangentially, and what follows has some length")
 

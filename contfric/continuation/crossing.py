@@ -294,12 +294,12 @@ def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray
 
     A branch may begin with another segment of the same motion, and in another period.
     """
-    word, wanted = branch.system.word, orbit.system.word
-    if len(word) != len(wanted) or branch.system.half:
-        return branch.joints[k] if word == wanted else None
+    itinerary, wanted = branch.system.itinerary, orbit.system.itinerary
+    if len(itinerary) != len(wanted) or branch.system.half:
+        return branch.joints[k] if itinerary == wanted else None
     best: tuple[float, FloatArray] | None = None
-    for first in range(len(word)):
-        if word[first:] + word[:first] != wanted:
+    for first in range(len(itinerary)):
+        if itinerary[first:] + itinerary[:first] != wanted:
             continue
         turned = [_turned(branch[i], first) for i in (reference, k)]
         shift = 0.0

@@ -46,10 +46,10 @@ def is_point(orbit: Orbit) -> bool:
 def never_leaves(orbit: Orbit) -> bool:
     """Tell whether the flights off a wall on which impacts come to rest have shrunk to nothing."""
     model, least = orbit.model, _NO_HEIGHT * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:]))))
-    for own in {model.chatter_by_mode[m] for m, _ in orbit.word if m in model.chatter_by_mode}:
+    for own in {model.chatter_by_mode[m] for m, _ in orbit.itinerary if m in model.chatter_by_mode}:
         gap, highest = model.surface_by_name[own.surface].observable, 0.0
         level = orbit.flow.level(own.surface)
-        for (mode, _), begin, end in zip(orbit.word, orbit.begins, orbit.ends, strict=True):
+        for (mode, _), begin, end in zip(orbit.itinerary, orbit.begins, orbit.ends, strict=True):
             if mode in model.chatter_by_mode:
                 continue
             lasts = float(end[0] - begin[0])
@@ -79,12 +79,15 @@ def equilibrium_met(orbit: Orbit) -> str | None:
     if not orbit.model.autonomous:
         return None
     size = float(np.max(np.ptp(np.vstack([orbit.begins, orbit.ends])[:, 1:], axis=0)))
-    for i, (mode, exit_) in enumerate(orbit.word):
+    for i, (mode, exit_) in enumerate(orbit.itinerary):
         lasts = float(orbit.ends[i, 0] - orbit.begins[i, 0])
         stands = orbit.model.is_at_rest(mode) or mode in orbit.model.chatter_by_mode
         if stands or lasts < SHORT * orbit.period:
             continue
-        for joint, surface in ((orbit.ends[i], exit_), (orbit.begins[i], orbit.word[i - 1][1])):
+        for joint, surface in (
+            (orbit.ends[i], exit_),
+            (orbit.begins[i], orbit.itinerary[i - 1][1]),
+        ):
             if _to_equilibrium(orbit, mode, joint, _PART * lasts) < _AT_EQUILIBRIUM * size:
                 return surface
     return None

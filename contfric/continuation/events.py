@@ -80,7 +80,7 @@ _MEANINGS = {
     Kind.T: "tangency: segments relabelled",
 }
 
-#: Kinds at which a branch of one reduced word cannot go on.
+#: Kinds at which a branch of one reduced itinerary cannot go on.
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 
@@ -227,7 +227,7 @@ class Bifurcation(MeasuredEvent):
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether the motion at the event is its own mirror image, whatever the words that meet."""
+        """Whether the motion at the event is its own mirror image, whatever the itineraries that meet."""
         if self.orbit.symmetric:
             return True
         if self.orbit.model.symmetry is None:
@@ -236,7 +236,7 @@ class Bifurcation(MeasuredEvent):
 
     @property
     def outline(self) -> Outline:
-        """The slides of the motion at the event, whatever word it was reached with."""
+        """The slides of the motion at the event, whatever itinerary it was reached with."""
         return self.orbit.outline
 
     @property
@@ -249,8 +249,8 @@ class Bifurcation(MeasuredEvent):
     @property
     def meaning(self) -> str:
         """What happens, in words: that of its kind, but only where something slides it is a sliding."""
-        model, word = self.orbit.model, self.orbit.system.word
-        if model.wraps & {s for t in self.tests for s in (t.surface, word[t.segment][1])}:
+        model, itinerary = self.orbit.model, self.orbit.system.itinerary
+        if model.wraps & {s for t in self.tests for s in (t.surface, itinerary[t.segment][1])}:
             return "a joint where an angle begins a new turn"
         chosen = filter(None, (chosen_at(self.orbit.system, test) for test in self.tests))
         if reset := next(chosen, ""):

@@ -1,8 +1,8 @@
-"""What follows an event as the flow itself says: the words that motions near it walk.
+"""What follows an event as the flow itself says: the itineraries that motions near it walk.
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
-met at once), motions near the orbit at the event walk its word or that of the orbit that takes over.
-So motions that start near it are followed for one turn, and each word that is new is proposed. It takes
+met at once), motions near the orbit at the event walk its itinerary or that of the orbit that takes over.
+So motions that start near it are followed for one turn, and each itinerary that is new is proposed. It takes
 no knowledge of the event, and finds nothing where what follows repels too fast to be walked.
 """
 
@@ -20,11 +20,11 @@ from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.slides import resting_modes
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
-from contfric.orbit.system import Word, build_system
-from contfric.signature import canonical_word
+from contfric.orbit.system import Itinerary, build_system
+from contfric.signature import canonical_itinerary
 
 #: Distances of the motions from the orbit at the event (nondimensional), the nearest first: where a turn
-#: amplifies much only those are guesses that Newton's method takes, where little the others change the word.
+#: amplifies much only those are guesses that Newton's method takes, where little the others change the itinerary.
 _BESIDE = (1e-7, 1e-5, 1e-3)
 #: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
 _LONGER = 1.2
@@ -35,24 +35,26 @@ _LEFT = 1e-9
 
 
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
-    """Yield orbits, not solved, of the words that motions near an orbit walk in one turn.
+    """Yield orbits, not solved, of the itineraries that motions near an orbit walk in one turn.
 
-    The same word may come again, as a guess from a motion farther away.
+    The same itinerary may come again, as a guess from a motion farther away.
 
     Parameters
     ----------
     orbit : the orbit at the event, on its whole cycle
     shifts : (parameter, change) of further motions, from the orbit itself at other parameters
     """
-    own, seen = canonical_word(orbit.word, orbit.model), set()
+    own, seen = canonical_itinerary(orbit.itinerary, orbit.model), set()
     start = _inside(orbit)
     for size, vector, state in _beside(orbit, start[1], shifts):
         found = _one_turn(orbit, start, vector, state)
         if found is None:
             continue
-        word = canonical_word(found.word, orbit.model)
-        if word != own and (word, size) not in seen:  # from another distance it is another guess
-            seen.add((word, size))
+        itinerary = canonical_itinerary(found.itinerary, orbit.model)
+        if (
+            itinerary != own and (itinerary, size) not in seen
+        ):  # from another distance it is another guess
+            seen.add((itinerary, size))
             yield found
 
 
@@ -63,7 +65,7 @@ def _inside(orbit: Orbit) -> tuple[int, float]:
     """
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     resting = resting_modes(orbit)
-    rests = [mode in resting for mode, _ in orbit.word]
+    rests = [mode in resting for mode, _ in orbit.itinerary]
     i = int(np.argmax(np.where(rests, -1.0, lasts)))
     times = orbit.cycle[i, 0] + _PLACES * lasts[i]
     states = [orbit.state(float(time)) for time in times]
@@ -107,17 +109,17 @@ def _one_turn(
     stop = _end_of_turn(orbit, trajectory, start, unit)
     if stop is None:
         return None
-    word: Word = trajectory.word[:stop]
+    itinerary: Itinerary = trajectory.itinerary[:stop]
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
     joints = np.column_stack([clock, trajectory.states])[:stop]
     end = float(joints[-1, 0])
     joints = np.roll(joints, 1, axis=0)
     joints[0, 0] = end - orbit.period
-    word, joints, end = without_sections(model, word, joints, end, vector, orbit.periods)
-    if len(word) == 1 and is_smooth(model, word) and not model.wraps:
+    itinerary, joints, end = without_sections(model, itinerary, joints, end, vector, orbit.periods)
+    if len(itinerary) == 1 and is_smooth(model, itinerary) and not model.wraps:
         return None  # a cycle that crosses a section comes back through it: this one has not closed
     try:
-        system = build_system(model, word, orbit.periods)
+        system = build_system(model, itinerary, orbit.periods)
     except ValueError:
         return None
     return Orbit(system, clocked(model, joints, end), vector.copy(), np.inf, Status.NOT_CONVERGED)
@@ -127,18 +129,18 @@ def _end_of_turn(
     orbit: Orbit, trajectory: Trajectory, start: tuple[int, float], unit: float
 ) -> int | None:
     """Return the number of events of one turn; None if the motion is in another mode after it."""
-    model, word = orbit.model, trajectory.word
+    model, itinerary = orbit.model, trajectory.itinerary
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
     i, time = start
     count = int(np.searchsorted(clock, time + orbit.period))
-    mode = word[count][0] if count < len(word) else trajectory.last[3]
-    same = bool(mode) and model.whole_mode(mode) == model.whole_mode(orbit.word[i][0])
+    mode = itinerary[count][0] if count < len(itinerary) else trajectory.last[3]
+    same = bool(mode) and model.whole_mode(mode) == model.whole_mode(orbit.itinerary[i][0])
     return count if count > 0 and same else None
 
 
 def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
     """Return the mode, as it was declared, that a motion near segment i is in."""
-    model, mode = orbit.model, orbit.word[i][0]
+    model, mode = orbit.model, orbit.itinerary[i][0]
     if mode not in model.joined:
         return mode
     signs = signs_at(model, time, state, orbit.vector)

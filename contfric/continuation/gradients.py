@@ -39,7 +39,7 @@ def gradient_of(
     if place.margin is Margin.JOINT:
         gradient[i + 1], slope = surface_gradient(orbit, place.surface, orbit.ends[i], active)
     elif place.margin is Margin.EXIT:
-        mode = held.departs if held is not None else orbit.word[i][0]
+        mode = held.departs if held is not None else orbit.itinerary[i][0]
         gradient[i + 1], slope = _rate_gradient(orbit, mode, place.surface, orbit.ends[i], active)
     elif place.margin is Margin.INTERIOR:
         try:
@@ -49,7 +49,7 @@ def gradient_of(
         if (
             touch[0] == orbit.begins[i, 0]
         ):  # the load of a hold that starts on its limit: whether it falls
-            mode = orbit.word[i][0]
+            mode = orbit.itinerary[i][0]
             gradient[i], slope = _rate_gradient(orbit, mode, place.surface, touch, active)
             return sign * gradient, sign * slope
         there, slope = surface_gradient(orbit, place.surface, touch, active)
@@ -102,7 +102,7 @@ def carried(
     """
     m, n, start = len(touch), len(touch) - 1, orbit.begins[i]
     time = float(start[0])
-    mode, lasts = orbit.word[i][0], float(touch[0]) - time
+    mode, lasts = orbit.itinerary[i][0], float(touch[0]) - time
     jac = orbit.flow.jacobian(mode, time, start[1:], lasts, active)
     gradient = np.empty(m)
     gradient[0] = there[1:] @ (jac[:, 0] - jac[:, 1 + n])

@@ -1,13 +1,13 @@
-"""All words that the motion at an event solves: its regular outcomes, and those that are held.
+"""All itineraries that the motion at an event solves: its regular outcomes, and those that are held.
 
-At an event one motion solves the equations of several words. The words differ at **places** of the motion
+At an event one motion solves the equations of several itineraries. The itineraries differ at **places** of the motion
 only: a stop on the limit, a touch inside of a stick, a stop without acceleration, a touch of rest inside of
-a slide. At each place there are few local outcomes (:mod:`contfric.continuation.outcomes`). Which words
+a slide. At each place there are few local outcomes (:mod:`contfric.continuation.outcomes`). Which itineraries
 there are is a property of the motion, not of the branch that came to it. So they are collected as a closure:
 
 1. The motion is cut down to its shortest period, and to half of it if it is its own symmetry image. That is
-   its **unit**. It is cut at the start of a slide of some length, which every word has.
-2. The word of the branch that arrives, cut into units, gives the first **forms** of the unit.
+   its **unit**. It is cut at the start of a slide of some length, which every itinerary has.
+2. The itinerary of the branch that arrives, cut into units, gives the first **forms** of the unit.
 3. Every margin that vanishes on an orbit of one form gives an outcome; the form with that outcome is a form,
    too. This is repeated until nothing new appears.
 
@@ -43,7 +43,7 @@ from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_MOTION, SHORT, resting_modes
-from contfric.orbit.system import Margin, Test, Word, build_system
+from contfric.orbit.system import Itinerary, Margin, Test, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
@@ -67,11 +67,11 @@ class Refusal:
 
 @dataclass(frozen=True)
 class Name:
-    """The kind of event that a step from some words of the unit to others is."""
+    """The kind of event that a step from some itineraries of the unit to others is."""
 
     kind: Kind
-    before: frozenset[Word]
-    after: frozenset[Word]
+    before: frozenset[Itinerary]
+    after: frozenset[Itinerary]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     unit = collection.unit
     if cut is None:
         places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
-        collection.edit(orbit, np.zeros(len(orbit.word)), "", places)
+        collection.edit(orbit, np.zeros(len(orbit.itinerary)), "", places)
     collection.close()
     return Incident(
         unit,
@@ -128,7 +128,7 @@ def _moves(orbit: Orbit) -> bool:
     """
     resting = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    for (mode, _), begin, last in zip(orbit.word, orbit.begins, lasts, strict=True):
+    for (mode, _), begin, last in zip(orbit.itinerary, orbit.begins, lasts, strict=True):
         if mode not in resting and last > SHORT:
             start = float(begin[0]), begin[1:]
             moved = [orbit.flow.state(mode, *start, float(last * share)) for share in _SHARES]
@@ -144,12 +144,12 @@ def _started(orbit: Orbit, unit: Unit, least: float) -> _Collection:
     """
     collection = _Collection(unit, least)
     try:
-        collection.take(orbit, np.zeros(len(orbit.word)), "")
+        collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
     except NotationError:
         collection = _Collection(
             replace(unit, periods=orbit.periods, half=False, duration=orbit.period), least
         )
-        collection.take(orbit, np.zeros(len(orbit.word)), "")
+        collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
     return collection
 
 
@@ -163,23 +163,23 @@ class _Collection:
         self.refusals: list[Refusal] = []
         self.names: list[Name] = []
         self._waiting: deque[Form] = deque()
-        self._words: set[Word] = set()
+        self._itineraries: set[Itinerary] = set()
 
-    def take(self, orbit: Orbit, away: FloatArray, reason: str) -> frozenset[Word]:
-        """Take the units of an orbit as forms; return their words."""
+    def take(self, orbit: Orbit, away: FloatArray, reason: str) -> frozenset[Itinerary]:
+        """Take the units of an orbit as forms; return their itineraries."""
         taken = pieces(orbit, self.unit)
         for piece in taken:
-            if piece.word in self._words:
+            if piece.itinerary in self._itineraries:
                 continue
             if len(self.forms) >= _MOST_FORMS:
-                text = f"more than {_MOST_FORMS} words at once: the others are not tried"
+                text = f"more than {_MOST_FORMS} itineraries at once: the others are not tried"
                 self.refusals.append(Refusal("other outcomes", text))
                 break
             form = form_of(orbit, away, self.unit, piece, reason)
-            self._words.add(form.word)
+            self._itineraries.add(form.itinerary)
             self.forms.append(form)
             self._waiting.append(form)
-        return frozenset(piece.word for piece in taken)
+        return frozenset(piece.itinerary for piece in taken)
 
     def close(self) -> None:
         """Add what the outcomes at the places of every form make of it."""
@@ -191,7 +191,7 @@ class _Collection:
                 self.refusals.append(Refusal(form.reason, str(error)))
                 self.forms = [other for other in self.forms if other is not form]
                 continue
-            count = len(form.word)
+            count = len(form.itinerary)
             places = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
             away = np.concatenate([form.away, form.away]) if self.unit.half else form.away
             self.edit(orbit, away, form.reason, places)
@@ -202,7 +202,7 @@ class _Collection:
         """Add the forms that follow from the outcomes at places of an orbit."""
         if not places:
             return
-        before = frozenset(piece.word for piece in pieces(orbit, self.unit))
+        before = frozenset(piece.itinerary for piece in pieces(orbit, self.unit))
         for place, kind in places:
             try:
                 outcome = outcome_at(orbit, place, kind)
@@ -247,7 +247,7 @@ def _vanished(orbit: Orbit) -> Iterator[Test]:
 def edited_whole(
     orbit: Orbit, outcomes: list[Outcome], away: FloatArray | None = None
 ) -> tuple[Orbit, FloatArray]:
-    """Return the same motion as a whole orbit of the edited word, and how its joints move away, shape (N,).
+    """Return the same motion as a whole orbit of the edited itinerary, and how its joints move away, shape (N,).
 
     Parameters
     ----------
@@ -263,19 +263,19 @@ def edited_whole(
         edit |= outcome.edit
         joints |= outcome.joints
         speeds |= outcome.away
-    word = named_by_ends(apply_edit(orbit.word, edit, orbit.model), orbit.model)
-    origins = [origin for origin, _ in edited_pieces(orbit.word, edit)]
+    itinerary = named_by_ends(apply_edit(orbit.itinerary, edit, orbit.model), orbit.model)
+    origins = [origin for origin, _ in edited_pieces(orbit.itinerary, edit)]
     starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
-    kept = np.zeros(len(orbit.word)) if away is None else away
+    kept = np.zeros(len(orbit.itinerary)) if away is None else away
     moves = np.array([speeds.get(o, kept[o[0]] if o[1] < 0 else 0.0) for o in origins])
-    first = next(k for k, (_, exit_) in enumerate(word) if not exit_.startswith("hold@"))
+    first = next(k for k, (_, exit_) in enumerate(itinerary) if not exit_.startswith("hold@"))
     if first:
-        word, moves = word[first:] + word[:first], np.roll(moves, -first)
+        itinerary, moves = itinerary[first:] + itinerary[:first], np.roll(moves, -first)
         starts = np.roll(starts, -first, axis=0)
         starts[-first:, 0] += orbit.period
     starts = clocked(orbit.model, starts, float(starts[0, 0]) + orbit.period)
     try:
-        system = build_system(orbit.model, word, orbit.periods)
+        system = build_system(orbit.model, itinerary, orbit.periods)
     except ValueError as error:
         raise NotationError(str(error)) from None
     return replace(orbit, system=system, joints=starts, status=Status.CONVERGED), moves

@@ -1,17 +1,17 @@
-"""Which words over two orbits can have a window: a necessary condition from the map of their release.
+"""Which itineraries over two orbits can have a window: a necessary condition from the map of their release.
 
 Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.continuation.release_map`). Its release
 is then in
 
     I(w_1 ... w_k) = F_{w_k}(I(w_1 ... w_{k-1}) on the side of w_k),      I() = D.
 
-If this set is empty, no orbit in D takes these turns one after the other: no word has them in it. A word that
+If this set is empty, no orbit in D takes these turns one after the other: no itinerary has them in it. An itinerary that
 comes to nothing when it is run through again and again has no window.
 
 Nothing is assumed of the shape of F. If both branches increase and leave a gap between the images of the
 jump, F is a circle map with a gap. Then all orbits at a parameter have one rotation number p / q, and the
-words that are left are the balanced ones, in the order of the Farey tree. If a branch decreases, F need not
-be one-to-one, and windows of words ``a^n b`` may overlap (period incrementing). Below the bridge of Fig. 5
+itineraries that are left are the balanced ones, in the order of the Farey tree. If a branch decreases, F need not
+be one-to-one, and windows of itineraries ``a^n b`` may overlap (period incrementing). Below the bridge of Fig. 5
 F_b has a maximum near the jump, and both kinds are met.
 
 Between the samples F is interpolated linearly, with an error below ``(d_ss + d_pp) / 8``, d the second
@@ -35,29 +35,29 @@ from contfric.signature.cyclic import least_rotation, primitive_length
 
 #: Parts of a range between two sampled parameters, each with its own intervals.
 _PARTS = 8
-#: Turns for which a word that does not come to nothing is run through.
+#: Turns for which an itinerary that does not come to nothing is run through.
 _TURNS = 36
 #: Widening of the intervals, in second differences.
 _WIDENING = 0.25
 
 
-def words_with_ranges(
+def itineraries_with_ranges(
     letters: dict[str, Orbit], bridge: Branch, grid: FloatArray, longest: int
 ) -> Iterator[tuple[str, FloatArray]]:
-    """Yield the words that can have a window, each with the parameters of the grid around it.
+    """Yield the itineraries that can have a window, each with the parameters of the grid around it.
 
-    Words have both letters; each comes once up to rotation, and none repeats itself. All of them come, with
+    Itineraries have both letters; each comes once up to rotation, and none repeats itself. All of them come, with
     the whole grid, if the release is no map of an interval.
 
     Parameters
     ----------
     letters : the two orbits by their letters a and b, each from the slide to the stop that tells them apart
     grid : increasing parameters
-    longest : most turns of a word
+    longest : most turns of an itinerary
     """
     samples = sampled(letters, bridge, grid)
     if samples is None:
-        yield from ((turns, grid) for turns in _all_words(longest))
+        yield from ((turns, grid) for turns in _all_itineraries(longest))
         return
     branches = {letter: _Images(found) for letter, found in samples.items()}
     for turns, parts in _possible(branches, longest):
@@ -65,33 +65,33 @@ def words_with_ranges(
         yield turns, grid[max(first - 1, 0) : last + 2]
 
 
-def _all_words(longest: int) -> Iterator[str]:
+def _all_itineraries(longest: int) -> Iterator[str]:
     for length in range(2, longest + 1):
         for letters in product("ab", repeat=length):
-            if _is_word("".join(letters)):
+            if _is_itinerary("".join(letters)):
                 yield "".join(letters)
 
 
-def _is_word(turns: str) -> bool:
-    """Tell whether turns are a word: both letters, the least of its rotations, and no repetition."""
+def _is_itinerary(turns: str) -> bool:
+    """Tell whether turns are an itinerary: both letters, the least of its rotations, and no repetition."""
     both = len(set(turns)) == 2
     return both and least_rotation(turns) == 0 and primitive_length(turns) == len(turns)
 
 
 def _may_be_least(turns: str) -> bool:
-    """Tell whether turns begin a word that is the least of its rotations."""
+    """Tell whether turns begin an itinerary that is the least of its rotations."""
     return all(turns[k:] >= turns[: len(turns) - k] for k in range(1, len(turns)))
 
 
 def _possible(branches: dict[str, _Images], longest: int) -> Iterator[tuple[str, IntArray]]:
-    """Yield words that do not come to nothing, with the parts of the range in which they do not."""
+    """Yield itineraries that do not come to nothing, with the parts of the range in which they do not."""
     low = min(images.end for images in branches.values())
     high = max(images.end for images in branches.values())
     parts = np.arange(next(iter(branches.values())).parts)
     waiting = [("", (parts, np.full(len(parts), low), np.full(len(parts), high)))]
     while waiting:
         turns, left = waiting.pop()
-        if _is_word(turns):
+        if _is_itinerary(turns):
             again = left
             for letter in turns * (_TURNS // len(turns)):
                 again = branches[letter].of(*again)

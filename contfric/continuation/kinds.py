@@ -50,7 +50,7 @@ _VANISHED = 1e-3
 
 def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
-    model, mode = system.model, system.word[test.segment][0]
+    model, mode = system.model, system.itinerary[test.segment][0]
     hold = hold_of_test(test, orbit)
     if hold is not None:
         return kind_of_hold(hold, test)
@@ -79,7 +79,7 @@ def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
     for hold in orbit.system.holds:
         if test.segment == hold.segment:
             return hold
-        behind = (hold.segment + 1) % len(orbit.system.word)
+        behind = (hold.segment + 1) % len(orbit.system.itinerary)
         if test.segment == behind and test.margin is not Margin.JOINT:
             duration = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
             if duration < _VANISHED:

@@ -9,7 +9,7 @@ import numpy as np
 from contfric.base.tally import tally
 from contfric.continuation.points import Point, Rows, Settings
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 
 def locate_change(
@@ -94,7 +94,7 @@ def locate_value(
     # the bracket ends within rounding of the value: solve at the value itself
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = target
-    exact = polish(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
+    exact = refine(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
     if exact.converged and np.max(np.abs(exact.joints - found.joints)) < 1e-6:
         found.joints, found.w = exact.joints, np.array([target])
     return found

@@ -31,10 +31,10 @@ class MeasuredEvent(Shown):
         from contfric.quantities.inside import laws_of
 
         event = cast("Bifurcation", self)
-        model, word = event.orbit.model, event.orbit.system.word
+        model, itinerary = event.orbit.model, event.orbit.system.itinerary
         met = {test.surface for test in event.tests}
         for test in event.tests:  # what ends a segment where another surface is met belongs to it
-            mode, exit_ = word[test.segment]
+            mode, exit_ = itinerary[test.segment]
             if test.margin is Margin.JOINT and not is_section(model, mode, exit_):
                 met.add(exit_)
         surfaces = met | {

@@ -1,7 +1,7 @@
-"""What can follow a sliding event at one place of an orbit: the edit of its word, and why.
+"""What can follow a sliding event at one place of an orbit: the edit of its itinerary, and why.
 
 The motion at the event is known, so the local structure of each outcome can be derived from it
-(``docs/bridges.md``). It needs the word, the transitions and the flow; nothing knows what moves.
+(``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
 
 =====================================  ========================================================
 event, at the place                    outcome
@@ -70,7 +70,7 @@ _APPEARS = (-0.5, 0.5)
 #: Where a has a double zero, ``a = k (t^2 - w^2) / 2``, a slide that is left at -2w touches rest at w.
 _APPEARS_TOUCHING = (-2.0, 1.0)
 
-#: Where the segments of an edited word come from, as :func:`contfric.signature.edits.edited_pieces` says.
+#: Where the segments of an edited itinerary come from, as :func:`contfric.signature.edits.edited_pieces` says.
 Origin = tuple[int, int]
 
 
@@ -88,7 +88,7 @@ class Outcome:
 
     Attributes
     ----------
-    edit : the change of the word
+    edit : the change of the itinerary
     joints : start joints of the segments that come in or move, by their origin
     reason : what happens, in words
     away : where the new orbit is singular at the event itself, how fast its joints move in time when it
@@ -110,7 +110,7 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
     NotationError
         If nothing can: the reason says why.
     """
-    mode, exit_ = orbit.word[place.segment]
+    mode, exit_ = orbit.itinerary[place.segment]
     if is_hold(exit_):
         return _hold_ends(orbit, place)
     if reset := chosen_at(orbit.system, place):
@@ -125,7 +125,10 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         return Outcome(edit, joints, reason, away)
     if kind is Kind.CS:
         i, surface = place.segment, place.surface
-        edit, joints = swap_edit(orbit.word, {i: surface}, orbit.model), {(i, 0): orbit.ends[i]}
+        edit, joints = (
+            swap_edit(orbit.itinerary, {i: surface}, orbit.model),
+            {(i, 0): orbit.ends[i]},
+        )
         return Outcome(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
     if kind is Kind.SS:
         return _stop_on_surface(orbit, place)
@@ -143,11 +146,11 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
 
 def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
     """SS: the stop is on a surface, and the load falls."""
-    model, word, i = orbit.model, orbit.word, place.segment
-    j = (i + 1) % len(word)
-    rest = _rest_mode(orbit, i, word[i][1])
+    model, itinerary, i = orbit.model, orbit.itinerary, place.segment
+    j = (i + 1) % len(itinerary)
+    rest = _rest_mode(orbit, i, itinerary[i][1])
     _check_held(orbit, rest, release_mode(model, rest, place.surface), orbit.ends[i])
-    if model.mode_by_name[word[j][0]].sliding:
+    if model.mode_by_name[itinerary[j][0]].sliding:
         return _stick_becomes_hold(orbit, j, hold_at(place.surface), place.surface)
     edit = insert(i, (rest, hold_at(place.surface)))
     reason = f"hold at stop {i + 1}, on {place.surface}, instead of the reversal"
@@ -156,36 +159,36 @@ def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
 
 def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     """GS: a stop without acceleration."""
-    word, i = orbit.word, place.segment
-    j = (i + 1) % len(word)
-    _rest_mode(orbit, i, word[i][1])
-    if not orbit.model.mode_by_name[word[j][0]].sliding:
+    itinerary, i = orbit.itinerary, place.segment
+    j = (i + 1) % len(itinerary)
+    _rest_mode(orbit, i, itinerary[i][1])
+    if not orbit.model.mode_by_name[itinerary[j][0]].sliding:
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
-    _check_inside(orbit, word[j][0], orbit.ends[i])
+    _check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
 
 def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
     """AS: a stick is released where its load just reaches the limit."""
-    i, (mode, exit_) = place.segment, orbit.word[place.segment]
+    i, (mode, exit_) = place.segment, orbit.itinerary[place.segment]
     _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
-    reason = f"hold behind the tangential release of stick {i + 1} at {orbit.word[i][1]}"
+    reason = f"hold behind the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
 def _pinned_at_stop(orbit: Orbit, place: Test) -> Outcome:
     """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
-    i, surface = place.segment, orbit.word[place.segment][1]
-    edit = Edit(frozenset({i}), {(i + 1) % len(orbit.word): hold_at(surface)})
+    i, surface = place.segment, orbit.itinerary[place.segment][1]
+    edit = Edit(frozenset({i}), {(i + 1) % len(orbit.itinerary): hold_at(surface)})
     return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold behind it starts at the stop")
 
 
 def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     """AS: inside of a stick its load touches the limit."""
-    model, word, i = orbit.model, orbit.word, place.segment
-    mode, exit_ = word[i]
-    j = (i + 1) % len(word)
+    model, itinerary, i = orbit.model, orbit.itinerary, place.segment
+    mode, exit_ = itinerary[i]
+    j = (i + 1) % len(itinerary)
     touch = touch_of(orbit, i, place.surface)
     departs = _released(model, mode, place.surface)
     _check_held(orbit, mode, departs, touch)
@@ -197,7 +200,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
         away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
         return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
-    if is_hold(word[j][1]):  # the stick ended tangentially: its hold begins earlier
+    if is_hold(itinerary[j][1]):  # the stick ended tangentially: its hold begins earlier
         edit = Edit(renamed={i: place.surface, j: TOUCH})
         return Outcome(edit, {(j, -1): touch}, reason)
     return Outcome(split(i, place.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
@@ -206,7 +209,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
 def _rest_touched(orbit: Orbit, place: Test) -> Outcome:
     """GS: inside of a slide the velocity touches zero."""
     i = place.segment
-    mode, exit_ = orbit.word[i]
+    mode, exit_ = orbit.itinerary[i]
     touch = touch_of(orbit, i, place.surface)
     rest = _rest_mode(orbit, i, place.surface)
     _check_inside(orbit, rest, touch)
@@ -217,10 +220,10 @@ def _rest_touched(orbit: Orbit, place: Test) -> Outcome:
 
 def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Outcome:
     """Return the outcome in which a stick that begins at the event is a hold."""
-    model, word = orbit.model, orbit.word
-    mode, exit_ = word[j]
-    behind = (j + 1) % len(word)
-    departs = word[j - 1][0] if surface is None else _released(model, mode, surface)
+    model, itinerary = orbit.model, orbit.itinerary
+    mode, exit_ = itinerary[j]
+    behind = (j + 1) % len(itinerary)
+    departs = itinerary[j - 1][0] if surface is None else _released(model, mode, surface)
     reason = f"hold instead of stick {j + 1}"
     still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), departs)
     if still is not None:
@@ -230,7 +233,9 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
         return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
     edit = split(j, hold)
-    if is_hold(word[behind][1]):  # the stick ended tangentially: one hold takes the place of both
+    if is_hold(
+        itinerary[behind][1]
+    ):  # the stick ended tangentially: one hold takes the place of both
         edit |= drop(behind)
     return Outcome(edit, {}, reason)
 
@@ -251,15 +256,15 @@ def _released(model: Model, mode: str, surface: str) -> str:
 
 def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     """Return what follows where a hold comes to an end of its freedom."""
-    h, word = place.segment, orbit.word
-    before, behind = h - 1, (h + 1) % len(word)
-    after_rest = orbit.model.mode_by_name[word[before][0]].sliding
-    at_touch = word[h][1] == TOUCH
+    h, itinerary = place.segment, orbit.itinerary
+    before, behind = h - 1, (h + 1) % len(itinerary)
+    after_rest = orbit.model.mode_by_name[itinerary[before][0]].sliding
+    at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
     if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length:
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
-            fused = Edit(frozenset({h, behind}), {before % len(word): word[behind][1]})
+            fused = Edit(frozenset({h, behind}), {before % len(itinerary): itinerary[behind][1]})
             return Outcome(fused, {}, reason)
         return Outcome(drop(h), {}, reason)
     if place.margin is Margin.JOINT:
@@ -270,12 +275,14 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     if place.margin is Margin.INTERIOR:
         return _pin_moves(orbit, place, after_rest)
     gone = orbit.ends[behind, 0] - orbit.cycle[behind, 0] < NEARLY_NO_LENGTH
-    if gone and word[(h + 2) % len(word)][1] == TOUCH:  # a second hold, and the slide between them
+    if (
+        gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH
+    ):  # a second hold, and the slide between them
         return _never_left(orbit, h, after_rest)
     touch = touch_of(orbit, h, None)
-    left = (word[behind][0], _leaves(orbit, word[h][0]))
+    left = (itinerary[behind][0], _leaves(orbit, itinerary[h][0]))
     reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
-    edit = insert(h, left, (word[h][0], TOUCH))
+    edit = insert(h, left, (itinerary[h][0], TOUCH))
     away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
     return Outcome(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
 
@@ -283,22 +290,22 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
 def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[int, ...]) -> Edit:
     """Return the edit that makes a hold the stick that it stands for, and drops others."""
     if after_rest:
-        return Edit(frozenset({h, *gone}), {(h - 1) % len(orbit.word): surface})
+        return Edit(frozenset({h, *gone}), {(h - 1) % len(orbit.itinerary): surface})
     return Edit(frozenset(gone), {h: surface})
 
 
 def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
     """Return the outcome where the slide behind a hold has vanished: the rest behind it takes over."""
-    word, count = orbit.word, len(orbit.word)
+    itinerary, count = orbit.itinerary, len(orbit.itinerary)
     slide, rest = (h + 1) % count, (h + 2) % count
-    if not orbit.model.mode_by_name[word[rest][0]].sliding:
+    if not orbit.model.mode_by_name[itinerary[rest][0]].sliding:
         raise NotationError(f"the slide behind hold {h + 1} vanishes, and no rest follows it")
     reason = f"the slide behind hold {h + 1} vanishes: it is held"
     if rest in (h, (h - 1) % count):
         raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
-    if word[rest][1] == TOUCH:  # two holds become one
+    if itinerary[rest][1] == TOUCH:  # two holds become one
         return Outcome(drop(slide, rest), {}, reason)
-    return Outcome(_as_stick(orbit, h, word[rest][1], after_rest, (slide, rest)), {}, reason)
+    return Outcome(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
 
 
 def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
@@ -309,9 +316,9 @@ def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
     if after_rest:
         if touches_again(orbit, h, place.surface, float(orbit.cycle[h, 0])):
             raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
-        edit = Edit(renamed={(h - 1) % len(orbit.word): place.surface, h: TOUCH})
+        edit = Edit(renamed={(h - 1) % len(orbit.itinerary): place.surface, h: TOUCH})
         return Outcome(edit, {(h, -1): touch}, reason)
-    return Outcome(split(h, place.surface, (orbit.word[h][0], TOUCH)), {(h, 0): touch}, reason)
+    return Outcome(split(h, place.surface, (orbit.itinerary[h][0], TOUCH)), {(h, 0): touch}, reason)
 
 
 def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
@@ -323,8 +330,8 @@ def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
 
 def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     """GS at a reset: an impact of speed zero comes in, or goes."""
-    word, i = orbit.word, place.segment
-    mode, exit_ = word[i]
+    itinerary, i = orbit.itinerary, place.segment
+    mode, exit_ = itinerary[i]
     if not orbit.model.reset_by_surface[place.surface].stays:
         raise NotationError(
             f"behind the reset at {place.surface} motion starts somewhere else: no orbit is near"
@@ -333,17 +340,19 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
         edit = split(i, place.surface, (mode, exit_))
         reason = f"impact at the touch of {place.surface} in segment {i + 1}"
         return Outcome(edit, {(i, 0): touch_of(orbit, i, place.surface)}, reason)
-    behind = (i + 1) % len(word)
+    behind = (i + 1) % len(itinerary)
     whole = orbit.model.whole_mode
-    if whole(word[behind][0]) != whole(mode) or len(word) < 2:
+    if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(
             f"the impact behind segment {i + 1} changes the mode: it cannot be left out"
         )
     reason = f"no impact on {place.surface} behind segment {i + 1}"
-    if word[behind] in orbit.model.sections:  # its mode says from which side the section is crossed
-        edit = Edit(frozenset({i, behind}), {}, {i: (word[behind],)})
+    if (
+        itinerary[behind] in orbit.model.sections
+    ):  # its mode says from which side the section is crossed
+        edit = Edit(frozenset({i, behind}), {}, {i: (itinerary[behind],)})
         return Outcome(edit, {(i, 0): orbit.cycle[i]}, reason)
-    return Outcome(Edit(frozenset({behind}), {i: word[behind][1]}), {}, reason)
+    return Outcome(Edit(frozenset({behind}), {i: itinerary[behind][1]}), {}, reason)
 
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
@@ -365,13 +374,13 @@ def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
 def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
     """Return the mode of rest on a surface that a slide comes to at its end, or at a touch of it."""
     model = orbit.model
-    for domain in model.domains_of(model.whole_mode(orbit.word[i][0])):
+    for domain in model.domains_of(model.whole_mode(orbit.itinerary[i][0])):
         for through, target in model.exits_of(domain.name):
             rest = model.domain_by_name[target].mode
             if through == surface and model.mode_by_name[rest].sliding:
                 return rest
     raise NoJump(
-        f"mode '{orbit.word[i][0]}' of model '{model.name}' never comes to rest on {surface}"
+        f"mode '{orbit.itinerary[i][0]}' of model '{model.name}' never comes to rest on {surface}"
     )
 
 

@@ -16,7 +16,7 @@ def places_of(bifurcation: Bifurcation) -> list[Test]:
     places = [normal_place(test, orbit) for test in bifurcation.tests]
     places = list(dict.fromkeys(places))
     if orbit.system.half and orbit.model.symmetry is not None:
-        n, image = len(orbit.system.word), orbit.model.symmetry.surfaces
+        n, image = len(orbit.system.itinerary), orbit.model.symmetry.surfaces
         places += [Test(t.margin, t.segment + n, image[t.surface]) for t in places]
     return places
 

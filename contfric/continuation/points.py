@@ -90,7 +90,7 @@ class Settings:
         """Return the largest step along a branch of a system's orbits."""
         layout = system.layout
         watched = any(len(rows) for rows in (layout.interior, layout.joint, layout.labels))
-        if not self.grows or watched or not is_smooth(system.model, system.word):
+        if not self.grows or watched or not is_smooth(system.model, system.itinerary):
             return self.largest
         return max(self.largest, SMOOTH_STEP)
 

@@ -23,7 +23,7 @@ import numpy as np
 from contfric.continuation.branch import Branch
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.prescribed import follow_word
+from contfric.orbit.prescribed import follow_itinerary
 from contfric.orbit.tables import surfaces_under
 
 #: Samples of each branch over its side of D; the first is next to the jump (in widths of the side), where
@@ -127,7 +127,7 @@ class _Release:
     @cached_property
     def surfaces(self) -> tuple[str, str] | None:
         """The surfaces of a release: that of the rest, and its exit; None if it has more than one number."""
-        a, b = (orbit.system.word for orbit in self.letters.values())
+        a, b = (orbit.system.itinerary for orbit in self.letters.values())
         model = self.bridge.model
         mode, exit_ = a[-1]
         if a[0] != b[0] or a[-1] != b[-1] or len(model.states) != 2:
@@ -186,7 +186,7 @@ class _Release:
         start = self._start(letter, value, time)
         joints, end, system = start.joints, np.empty(3), start.system
         joints[1] = np.nan  # written as soon as the stop is met
-        found = follow_word(system.functions(), system.layout, joints, start.vector, 1, end)
+        found = follow_itinerary(system.functions(), system.layout, joints, start.vector, 1, end)
         view = start.model.view(start.vector)
         height = view.height(self.pin, float(joints[1, 0]), joints[1, 1:])
         return (float(end[0]) if found else np.nan), height

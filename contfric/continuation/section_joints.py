@@ -35,9 +35,10 @@ def is_known_touch(side: Side, point: Point) -> bool:
 
 def is_on_section(bifurcation: Bifurcation) -> bool:
     """Tell whether an event would take away a joint on a section: there the orbit only touches it."""
-    word, sections = bifurcation.orbit.system.word, bifurcation.orbit.model.sections
+    itinerary, sections = bifurcation.orbit.system.itinerary, bifurcation.orbit.model.sections
     return bifurcation.kind is Kind.T and any(
-        test.margin is Margin.EXIT and word[test.segment] in sections for test in bifurcation.tests
+        test.margin is Margin.EXIT and itinerary[test.segment] in sections
+        for test in bifurcation.tests
     )
 
 
@@ -47,7 +48,7 @@ def move_joints(orbit: Orbit, side: Side, settings: Settings) -> bool:
     at = [
         k
         for k, test in enumerate(system.tests)
-        if test.margin is Margin.EXIT and system.word[test.segment] in orbit.model.sections
+        if test.margin is Margin.EXIT and system.itinerary[test.segment] in orbit.model.sections
     ]
     if not at:
         return False

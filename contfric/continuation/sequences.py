@@ -47,16 +47,16 @@ def necklaces(letters: int, length: int) -> Iterator[tuple[int, ...]]:
     >>> len(list(necklaces(2, 8)))
     30
     """
-    word = [-1]
-    while word:
-        word[-1] += 1
-        if len(word) == length:
-            yield tuple(word)
-        known = len(word)
-        while len(word) < length:
-            word.append(word[-known])
-        while word and word[-1] == letters - 1:
-            word.pop()
+    itinerary = [-1]
+    while itinerary:
+        itinerary[-1] += 1
+        if len(itinerary) == length:
+            yield tuple(itinerary)
+        known = len(itinerary)
+        while len(itinerary) < length:
+            itinerary.append(itinerary[-known])
+        while itinerary and itinerary[-1] == letters - 1:
+            itinerary.pop()
 
 
 def count(letters: int, length: int) -> int:

@@ -13,18 +13,18 @@ from __future__ import annotations
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
 from contfric.models.shared_loads import Limit
-from contfric.orbit.system import Word
+from contfric.orbit.system import Itinerary
 from contfric.signature.edits import Edit
 
 
-def limit_behind(model: ComposedModel, word: Word, i: int, surface: str) -> Limit | None:
+def limit_behind(model: ComposedModel, itinerary: Itinerary, i: int, surface: str) -> Limit | None:
     """Return the limit of a shared load that is met behind a joint; None if it is no such thing."""
     limit = model.composition.limit(surface)
-    return None if limit is None or surface in model.composition.ways(word[i][0]) else limit
+    return None if limit is None or surface in model.composition.ways(itinerary[i][0]) else limit
 
 
 def with_other_state(
-    model: ComposedModel, word: Word, i: int, limit: Limit, vanishes: bool
+    model: ComposedModel, itinerary: Itinerary, i: int, limit: Limit, vanishes: bool
 ) -> tuple[Edit, str]:
     """Return the edit where a contact has the other state behind a joint, and why.
 
@@ -32,8 +32,12 @@ def with_other_state(
     ----------
     vanishes : whether the segment behind the joint has no length
     """
-    n, name = len(word), limit.contact.name
-    (mode, exit_), (here, leaves), after = word[i], word[(i + 1) % n], word[(i + 2) % n][0]
+    n, name = len(itinerary), limit.contact.name
+    (mode, exit_), (here, leaves), after = (
+        itinerary[i],
+        itinerary[(i + 1) % n],
+        itinerary[(i + 2) % n][0],
+    )
     states = model.composition.states_in(here)
     lets_go = "p" if limit.sign == "+" else "n"
     other = "".join({**states, name: lets_go if states[name] == "s" else "s"}.values())
@@ -49,16 +53,18 @@ def with_other_state(
     return Edit(inserted={i: ((other, back),)}), f"'{name}' changes its state behind joint {i + 1}"
 
 
-def in_other_order(model: ComposedModel, word: Word, i: int, surface: str, short: int) -> Edit:
+def in_other_order(
+    model: ComposedModel, itinerary: Itinerary, i: int, surface: str, short: int
+) -> Edit:
     """Return the edit where a surface is met before that at which a segment ends.
 
     Parameters
     ----------
     short : number of segments behind the joint that have no length
     """
-    n, (mode, first) = len(word), word[i]
+    n, (mode, first) = len(itinerary), itinerary[i]
     for count in range(short, min(short, 1) - 1, -1):
-        target = word[(i + 1 + count) % n][0]
+        target = itinerary[(i + 1 + count) % n][0]
         gone = frozenset((i + 1 + k) % n for k in range(count))
         for between in _paths(model, mode, surface, first, target):
             if len(between) <= count or count == 0 < len(between):

@@ -135,7 +135,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    rests = here.model.mode_by_name[here.word[i][0]].sliding
+    rests = here.model.mode_by_name[here.itinerary[i][0]].sliding
     if rests or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
         return first
     before = (i - 1) % here.system.segments
@@ -152,7 +152,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
 def _hold_behind(here: Orbit, first: int) -> int:
     """Return the margin of the hold that a slide of no length any more leaves: it cannot be left any more."""
     tests = here.system.tests
-    if here.model.mode_by_name[here.system.word[tests[first].segment][0]].sliding:
+    if here.model.mode_by_name[here.system.itinerary[tests[first].segment][0]].sliding:
         return first  # a rest, and what that means is known
     hold = hold_of_test(tests[first], here)
     if hold is None:
@@ -193,7 +193,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
         return limit
     if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
         return first
-    at_start = rate_along(here, *here.word[i], here.begins[i])
+    at_start = rate_along(here, *here.itinerary[i], here.begins[i])
     if abs(at_start) < _NEARLY_REACHED:
         return first
     for k, other in enumerate(tests):
@@ -206,7 +206,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
 def _grazed_limit(here: Orbit, point: Point, first: int) -> int:
     """Return the margin of the exit whose rate is what vanishes at the joint; else that of the joint."""
     tests = here.system.tests
-    mode, exit_ = here.system.word[tests[first].segment]
+    mode, exit_ = here.system.itinerary[tests[first].segment]
     if is_hold(exit_) or not is_rate_of(here.model, mode, exit_, tests[first].surface):
         return first
     wanted = Test(Margin.EXIT, tests[first].segment, exit_)
@@ -237,7 +237,7 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
     start, end = here.cycle[test.segment, 0], here.ends[test.segment, 0]
     if end - start >= _VANISHED * here.period:
         return None
-    surface, segment = here.word[test.segment][1], test.segment - 1
+    surface, segment = here.itinerary[test.segment][1], test.segment - 1
     if segment < 0:  # of a half: the stop is the mirror image of the last one
         segment += here.system.segments
         symmetry = here.model.symmetry
@@ -284,7 +284,7 @@ def _once(here: Orbit, group: tuple[Test, ...]) -> tuple[Test, ...]:
         t
         for t in group
         if t.margin is not Margin.JOINT
-        or (t.segment, here.system.word[t.segment][1]) not in tangential
+        or (t.segment, here.system.itinerary[t.segment][1]) not in tangential
     )
 
 

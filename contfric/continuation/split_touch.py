@@ -54,7 +54,7 @@ def as_split(found: Bifurcation, tangent: FloatArray) -> Bifurcation | None:
     rest = np.delete(moved, pins)
     if not pins or np.max(rest, initial=0.0) > _ALONE * moved[pins].max():
         return None
-    tests = tuple(Test(Margin.INTERIOR, k, system.word[k - 1][1]) for k in pins)
+    tests = tuple(Test(Margin.INTERIOR, k, system.itinerary[k - 1][1]) for k in pins)
     known = tuple(test for test in tests if test in system.tests)
     return replace(found, kind=Kind.AS, tests=known) if known else None
 
@@ -65,7 +65,7 @@ def splits(orbit: Orbit) -> bool:
     With the rates of the load at +-s and +-2s around it, ``u' = e t - c t^3`` has the two coefficients.
     """
     for k in touch_holds(orbit.system):
-        mode, surface = orbit.word[k - 1]
+        mode, surface = orbit.itinerary[k - 1]
         observable = orbit.model.surface_by_name[surface].observable
         step, time = _APART * orbit.period, float(orbit.cycle[k, 0])
         one, two = (_mean_curvature(orbit, k - 1, mode, observable, time, n * step) for n in (1, 2))
@@ -87,7 +87,7 @@ def pinned_first(orbit: Orbit, vector: FloatArray) -> Orbit:
     """Return a guess at other parameters: a hold is pinned to the first of the highest maxima of its rest."""
     joints, flow = orbit.joints.copy(), replace(orbit, vector=vector).flow
     for k in touch_holds(orbit.system):
-        mode, surface = orbit.word[k - 1]
+        mode, surface = orbit.itinerary[k - 1]
         start, end = orbit.begins[k - 1], float(orbit.ends[k, 0])
         begin = float(start[0])
         observable = orbit.model.surface_by_name[surface].observable

@@ -13,7 +13,7 @@ from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Tests of the events that have a multiplier 1 or -1, the first ones.
 _LINEAR = 3
@@ -53,7 +53,7 @@ def _as_symmetric(orbit: Orbit) -> Orbit:
     part = symmetrised(orbit, _NEARLY_SYMMETRIC)
     if part is None or orbit.system.holds:
         return orbit
-    solved = polish(part)
+    solved = refine(part)
     away = np.min(np.abs(orbit.turn_multipliers - 1.0), initial=1.0)
     gap = np.max(np.abs(solved.cycle - orbit.joints)) if solved.converged else np.inf
     return solved if gap * away < _ROUNDING else orbit
@@ -84,7 +84,7 @@ def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, 
             continue
         vector = orbit.vector.copy()
         vector[active] = value
-        beside = polish(replace(orbit, vector=vector))
+        beside = refine(replace(orbit, vector=vector))
         point = first_point(beside, settings) if beside.converged and beside.admissible else None
         if point is not None and not _is_at_event(point, settings):
             return beside, point

@@ -27,9 +27,9 @@ def touched_at_joint(system: System, test: Test, orbit: Orbit) -> str | None:
     A slider that begins to slip reaches its limit where its velocity vanishes, and that may be the section:
     nothing stops there, and the touch is that inside of the segment, whose margin vanishes too. So it is
     where one of the two is the zero of the other one's rate, and nothing rests there: they are met at once
-    by a tangency alone, and which of them ends the segment is a matter of the word.
+    by a tangency alone, and which of them ends the segment is a matter of the itinerary.
     """
-    model, (mode, exit_) = system.model, system.word[test.segment]
+    model, (mode, exit_) = system.model, system.itinerary[test.segment]
     end = orbit.ends[test.segment]
     if is_section(model, mode, exit_):
         return (
@@ -48,7 +48,7 @@ def is_corner(system: System, test: Test, orbit: Orbit) -> bool:
     """Tell whether two surfaces are met at once at a joint, each with a speed: neither is only touched."""
     if test.margin is not Margin.JOINT:
         return False
-    mode, _ = system.word[test.segment]
+    mode, _ = system.itinerary[test.segment]
     return abs(rate_along(orbit, mode, test.surface, orbit.ends[test.segment])) > _PASSED
 
 
@@ -75,7 +75,7 @@ def resting_domain(system: System, test: Test) -> Domain | None:
 
     Where the surface is that of another contact, whose state changes at the same time, the rest goes on.
     """
-    return _resting(system.model, *system.word[test.segment], test.surface)
+    return _resting(system.model, *system.itinerary[test.segment], test.surface)
 
 
 @cache
@@ -142,7 +142,7 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
 def chosen_at(system: System, test: Test) -> str:
     """Return the surface of the reset that chooses the mode behind it by the side of a test; else nothing."""
     joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
-    exit_ = system.word[joint % len(system.word)][1]
+    exit_ = system.itinerary[joint % len(system.itinerary)][1]
     reset = system.model.reset_by_surface.get(exit_)
     chooses = reset is not None and test.surface in reset.chooses_by
     return exit_ if chooses and test.margin in (Margin.JOINT, Margin.ENTRY) else ""

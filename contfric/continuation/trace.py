@@ -225,7 +225,9 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     }
     if why in reasons:
         side.end = End(reasons[why])
-        if why == kernels.BROKEN and any(m in orbit.model.chatter_by_mode for m, _ in orbit.word):
+        if why == kernels.BROKEN and any(
+            m in orbit.model.chatter_by_mode for m, _ in orbit.itinerary
+        ):
             side.end = End(EndReason.BROKEN, _NO_REST)
         if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)

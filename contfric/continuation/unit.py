@@ -1,7 +1,7 @@
-"""The unit of a motion: its shortest period, or half of it if it is its own symmetry image; and its words.
+"""The unit of a motion: its shortest period, or half of it if it is its own symmetry image; and its itineraries.
 
-A motion at an event solves the equations of several words (:mod:`contfric.continuation.incident`). It is
-cut at the start of a slide of some length, which every word has; each word of a unit is a **form**.
+A motion at an event solves the equations of several itineraries (:mod:`contfric.continuation.incident`). It is
+cut at the start of a slide of some length, which every itinerary has; each itinerary of a unit is a **form**.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
+from contfric.orbit.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of
-from contfric.orbit.system import Word, build_system, mirror_mode
-from contfric.orbit.words import mirror_pairs
+from contfric.orbit.system import Itinerary, build_system, mirror_mode
 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """One word of the unit of a motion.
+    """One itinerary of the unit of a motion.
 
     Attributes
     ----------
-    word : mode and exit of each segment
+    itinerary : mode and exit of each segment
     joints : start joints (t, y) of the segments, shape (k, 1 + n)
     away : how fast the start joints move in time where the new orbit is singular at the event, shape (k,)
     reason : what happens at its places, in words
     unit : of the motion
     """
 
-    word: Word
+    itinerary: Itinerary
     joints: FloatArray
     away: FloatArray
     reason: str
@@ -46,14 +46,14 @@ class Form:
         Raises
         ------
         NotationError
-            If there is no such word.
+            If there is no such itinerary.
         """
         return self.unit.orbit((self,))[0]
 
     @property
     def has_hold(self) -> bool:
         """Whether something is held."""
-        return any(exit_.startswith("hold@") for _, exit_ in self.word)
+        return any(exit_.startswith("hold@") for _, exit_ in self.itinerary)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +97,9 @@ class Unit:
             starts[1::2, 1:] = starts[1::2, 1:] @ self.model.symmetry.array().T
         return starts
 
-    def image_word(self, word: Word, times: int) -> Word:
-        """Return a word of the unit as one of the unit that is some number of times later."""
-        return mirror_pairs(self.model, word) if self.half and times % 2 else word
+    def image_itinerary(self, itinerary: Itinerary, times: int) -> Itinerary:
+        """Return an itinerary of the unit as one of the unit that is some number of times later."""
+        return mirror_pairs(self.model, itinerary) if self.half and times % 2 else itinerary
 
     def orbit(self, forms: tuple[Form, ...]) -> tuple[Orbit, FloatArray]:
         """Return the motion as an orbit of forms one after the other, and how its joints move away.
@@ -109,17 +109,19 @@ class Unit:
         Raises
         ------
         NotationError
-            If there is no such word.
+            If there is no such itinerary.
         """
         count = len(forms)
-        word = tuple(pair for j, f in enumerate(forms) for pair in self.image_word(f.word, j))
+        itinerary = tuple(
+            pair for j, f in enumerate(forms) for pair in self.image_itinerary(f.itinerary, j)
+        )
         joints = np.concatenate([self.image(f.joints, j) for j, f in enumerate(forms)])
         away = np.concatenate([f.away for f in forms])
         half = self.half and count % 2 == 1
         periods = self.periods * count // (2 if self.half and not half else 1)
         joints = clocked(self.model, joints, float(joints[0, 0]) + count * self.duration)
         try:
-            system = build_system(self.model, word, periods, half)
+            system = build_system(self.model, itinerary, periods, half)
         except ValueError as error:
             raise NotationError(str(error)) from None
         return Orbit(system, joints, self.vector.copy(), 0.0, Status.CONVERGED), away
@@ -133,7 +135,7 @@ def unit_of(orbit: Orbit) -> Unit:
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
     longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
     duration = orbit.period / (turns * (2 if half else 1))
-    mode = orbit.word[longest][0]
+    mode = orbit.itinerary[longest][0]
     cut = np.array(orbit.cycle[longest])
     return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
 
@@ -146,12 +148,12 @@ class Piece:
     ----------
     number : units of the orbit before it
     segments : of the orbit; those past its end are of its next period
-    word : of the piece, as that of the first unit of the motion
+    itinerary : of the piece, as that of the first unit of the motion
     """
 
     number: int
     segments: range
-    word: Word
+    itinerary: Itinerary
 
 
 def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
@@ -164,23 +166,25 @@ def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
     """
     cuts = _cuts(orbit, unit)
     if cuts is None:
-        raise NotationError("the edited word does not begin with a slide where the motion does")
-    count, found = len(orbit.word), []
+        raise NotationError(
+            "the edited itinerary does not begin with a slide where the motion does"
+        )
+    count, found = len(orbit.itinerary), []
     for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):
         segments = range(start, stop if stop > start else stop + count)
-        word = tuple(orbit.word[i % count] for i in segments)
-        found.append(Piece(j, segments, unit.image_word(word, j)))
+        itinerary = tuple(orbit.itinerary[i % count] for i in segments)
+        found.append(Piece(j, segments, unit.image_itinerary(itinerary, j)))
     return found
 
 
 def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: Piece, reason: str) -> Form:
     """Return one unit of a whole orbit as a form, as the first unit of the motion."""
-    count = len(orbit.word)
+    count = len(orbit.itinerary)
     places = [i % count for i in piece.segments]
     joints = orbit.cycle[places]
     joints[:, 0] += np.array([orbit.period * (i // count) for i in piece.segments])
     joints[:, 0] += unit.cut[0] + piece.number * unit.duration - joints[0, 0]
-    return Form(piece.word, unit.image(joints, -piece.number), away[places], reason, unit)
+    return Form(piece.itinerary, unit.image(joints, -piece.number), away[places], reason, unit)
 
 
 def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
@@ -195,7 +199,7 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     cuts = []
     for j, fits in enumerate((gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION)):
         mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
-        found = [i for i in np.flatnonzero(fits) if whole(orbit.word[i][0]) == whole(mode)]
+        found = [i for i in np.flatnonzero(fits) if whole(orbit.itinerary[i][0]) == whole(mode)]
         if not found:
             return None
         cuts.append(int(found[0]))

@@ -70,7 +70,12 @@ def _gone_unseen(
     Their joints are those of one half only, and say nothing of the other: each orbit has to be run through.
     """
     model, system = orbit.model, orbit.system
-    if system.half or system.periods % 2 or model.autonomous or not is_smooth(model, system.word):
+    if (
+        system.half
+        or system.periods % 2
+        or model.autonomous
+        or not is_smooth(model, system.itinerary)
+    ):
         return None
     active = model.index_of(settings.parameter)
 

@@ -16,12 +16,12 @@ from contfric.continuation.along_curve import Line
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
+from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import crossings_near, in_halves, is_smooth
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import System, build_system
-from contfric.orbit.words import half_of
 
 #: Distance of a fold to its mirror image (or to its own second half) below which it may be the vertex
 #: of a pitchfork (of a period doubling). There the system is singular and the state is good to about
@@ -58,7 +58,7 @@ def symmetric_part(orbit: Orbit, active: int) -> Orbit | None:
 def symmetrised(orbit: Orbit, farthest: float = _NEARLY) -> Orbit | None:
     """Return the symmetric part of an orbit, not solved; None if it is far from its mirror image."""
     system = orbit.system
-    half = None if system.half else half_of(orbit.model, system.word, system.periods)
+    half = None if system.half else half_of(orbit.model, system.itinerary, system.periods)
     if half is None or orbit.model.symmetry is None:
         return None
     n = len(half)
@@ -83,14 +83,14 @@ def undoubled(orbit: Orbit) -> Orbit | None:
     """Return the orbit of half the period that an orbit is near, not solved; None if far."""
     orbit = in_halves(orbit)
     system = orbit.system
-    n, odd = divmod(len(system.word), 2)
-    if system.half or odd or system.periods % 2 or system.word[:n] != system.word[n:]:
+    n, odd = divmod(len(system.itinerary), 2)
+    if system.half or odd or system.periods % 2 or system.itinerary[:n] != system.itinerary[n:]:
         return None
     image: FloatArray = orbit.joints[n:].copy()
     image[:, 0] -= 0.5 * orbit.period
     if np.max(np.abs(image - orbit.joints[:n])) > _NEARLY:
         return None
-    part = build_system(orbit.model, system.word[:n], system.periods // 2)
+    part = build_system(orbit.model, system.itinerary[:n], system.periods // 2)
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
     return replace(orbit, system=part, joints=middle)
@@ -119,7 +119,7 @@ def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[i
     image = _image_of_second_half(system)
     if image is None or len(joints) < 2:
         return None
-    n = len(system.word) // 2
+    n = len(system.itinerary) // 2
     odd = (joints[:, n:, 1:] @ image - joints[:, :n, 1:]).reshape(len(joints), -1)
     size = np.sum(odd * odd, axis=1)
     known = np.maximum.accumulate(np.where(size > _ODD**2, np.arange(len(size)), -1))[:-1]
@@ -140,14 +140,14 @@ def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[i
 
 
 def _image_of_second_half(system: System) -> FloatArray | None:
-    """Return the state matrix that takes the second half of a word to the first; None if none does."""
-    n, odd = divmod(len(system.word), 2)
+    """Return the state matrix that takes the second half of an itinerary to the first; None if none does."""
+    n, odd = divmod(len(system.itinerary), 2)
     if system.half or odd:
         return None
     symmetry = system.model.symmetry
-    if symmetry is not None and half_of(system.model, system.word, system.periods) is not None:
+    if symmetry is not None and half_of(system.model, system.itinerary, system.periods) is not None:
         return symmetry.array()
-    doubled = system.periods % 2 == 0 and system.word[:n] == system.word[n:]
+    doubled = system.periods % 2 == 0 and system.itinerary[:n] == system.itinerary[n:]
     return np.eye(len(system.model.states)) if doubled else None
 
 
@@ -165,14 +165,14 @@ def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
     whole = simple.as_whole()
     if whole.joints.shape != joints.shape:
         return simple.doubled().joints
-    if not is_smooth(simple.model, whole.word) or simple.model.autonomous:
+    if not is_smooth(simple.model, whole.itinerary) or simple.model.autonomous:
         return whole.joints
     return crossings_near(whole, joints)  # one each way, however long the orbit is
 
 
 def _vertex(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit solved if its turn has a multiplier -1, else None."""
-    solved = polish(orbit, damped=False)
+    solved = refine(orbit, damped=False)
     if not solved.converged:  # the simpler orbits turn there, too
         return _refined_along(orbit, active)
     if not abs(opening(solved)) < _OPENS:
@@ -316,7 +316,7 @@ def moved(orbit: Orbit, active: int, value: float) -> Orbit:
     """Return an orbit solved at another value of a parameter; its status says whether it is."""
     vector = orbit.vector.copy()
     vector[active] = value
-    return polish(replace(orbit, vector=vector), damped=False)
+    return refine(replace(orbit, vector=vector), damped=False)
 
 
 def parabola_vertex(before: Point, after: Point, share: float) -> Point:

@@ -76,7 +76,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
     """Return the acceleration with which a rest would be left, as a function of time."""
 
     def rate(time: float) -> float:
-        return leaving_rate(orbit, orbit.word[i][0], departs, joint_within(orbit, i, time))
+        return leaving_rate(orbit, orbit.itinerary[i][0], departs, joint_within(orbit, i, time))
 
     return rate
 
@@ -95,14 +95,18 @@ def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
     start = orbit.begins[i]
     begin = float(start[0])
-    return np.array([time, *orbit.flow.state(orbit.word[i][0], begin, start[1:], time - begin)])
+    return np.array(
+        [time, *orbit.flow.state(orbit.itinerary[i][0], begin, start[1:], time - begin)]
+    )
 
 
 def stationary_values(orbit: Orbit, i: int, observable: str) -> list[tuple[float, float]]:
     """Return times and values of the stationary points of an observable along a segment."""
     start = orbit.begins[i]
     begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
-    times, values = orbit.flow.stationary(orbit.word[i][0], observable, begin, start[1:], lasts)
+    times, values = orbit.flow.stationary(
+        orbit.itinerary[i][0], observable, begin, start[1:], lasts
+    )
     return [(begin + float(t), float(v)) for t, v in zip(times, values, strict=True)]
 
 
@@ -125,7 +129,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     """
     model = orbit.model
     if surface is None:
-        departs = orbit.word[(i + 1) % len(orbit.word)][0]
+        departs = orbit.itinerary[(i + 1) % len(orbit.itinerary)][0]
         rate = _departure_rate(orbit, i, departs)
         still = _stationary(orbit, i)
         if not still:
@@ -135,11 +139,11 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
         time = min(still, key=rate)
         return joint_within(orbit, i, time)
     level = orbit.flow.level(surface)
-    sign = inside_sign(model, orbit.word[i][0], surface)
+    sign = inside_sign(model, orbit.itinerary[i][0], surface)
     observable = model.surface_by_name[surface].observable
     found = stationary_values(orbit, i, observable)
     start = orbit.begins[i]
-    rises = orbit.flow.rate(orbit.word[i][0], observable, float(start[0]), start[1:])
+    rises = orbit.flow.rate(orbit.itinerary[i][0], observable, float(start[0]), start[1:])
     gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
     # behind a reset that has just touched, the motion is at its start again: no touch of its own
     rests = surface not in model.reset_by_surface
@@ -158,7 +162,7 @@ def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:
     Not by chance, but for all parameters: under an even excitation a load at rest has maxima of equal height
     by twos, and it has the same ones in every period. Heights are compared at parameters beside, too.
     """
-    observable, mode = orbit.model.surface_by_name[surface].observable, orbit.word[i][0]
+    observable, mode = orbit.model.surface_by_name[surface].observable, orbit.itinerary[i][0]
     back, lasts = _BACK * orbit.period, float(orbit.ends[i, 0]) - start
     joint = joint_within(orbit, i, start)
 

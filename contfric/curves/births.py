@@ -39,9 +39,9 @@ def birth_between(
 
 def _odd_part(problem: Problem, point: Point) -> FloatArray:
     """Return the states of the second half less the image of the first."""
-    n = len(problem.system.word) // 2
+    n = len(problem.system.itinerary) // 2
     symmetry = problem.model.symmetry
     image = np.eye(len(problem.model.states))
-    if symmetry is not None and problem.system.word[:n] != problem.system.word[n:]:
+    if symmetry is not None and problem.system.itinerary[:n] != problem.system.itinerary[n:]:
         image = symmetry.array()
     return np.asarray(point.joints[n:, 1:] @ image - point.joints[:n, 1:])

@@ -32,7 +32,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class CurvePart:
-    """The points of a curve that share a reduced word and a kind.
+    """The points of a curve that share a reduced itinerary and a kind.
 
     Attributes
     ----------

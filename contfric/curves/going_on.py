@@ -1,8 +1,8 @@
-"""What a curve becomes behind another sliding event: the same condition in an edited word.
+"""What a curve becomes behind another sliding event: the same condition in an edited itinerary.
 
-At the event the motion is known, and every word that can follow it solves the same equations there
-(:mod:`contfric.continuation.candidates`). The condition is found again in the new word by its place: the
-same surface at the same time. SN, BP and PD go on if the new word has the multiplier as well: where the
+At the event the motion is known, and every itinerary that can follow it solves the same equations there
+(:mod:`contfric.continuation.candidates`). The condition is found again in the new itinerary by its place: the
+same surface at the same time. SN, BP and PD go on if the new itinerary has the multiplier as well: where the
 motion is differentiable through the event.
 """
 
@@ -32,16 +32,16 @@ from contfric.orbit.sections import canonical, moved
 from contfric.orbit.system import IntArray, Margin, Test
 from contfric.remember.journal import remembered
 
-#: Times of a joint in two words for one motion agree to this (nondimensional): located events are good to
+#: Times of a joint in two itineraries for one motion agree to this (nondimensional): located events are good to
 #: 1e-9 where two of them meet.
 _SAME_TIME = 1e-6
-#: A multiplier that a fold, branch point or doubling keeps in another word is the same to this.
+#: A multiplier that a fold, branch point or doubling keeps in another itinerary is the same to this.
 _SAME_MULTIPLIER = 1e-4
 #: The first point of a curve is the point that it leaves to this (relative to the ranges).
 _SAME_POINT = 1e-4
 #: Margins this small after the proof still vanish: they belong to the condition.
 _STILL = 1e-10
-#: Lengths of the steps by which a new word is proved, in largest steps. Margins may leave zero with the
+#: Lengths of the steps by which a new itinerary is proved, in largest steps. Margins may leave zero with the
 #: square of the distance: the longer one tells them from rounding.
 _PROOFS = (0.1, 0.01)
 #: A segment that lasts less than minus this does not exist.
@@ -69,7 +69,7 @@ def _tangent_at(orbit: Orbit, test: Test) -> Test:
 
     place, segment, surface = tangency(orbit, test)
     if place == START:  # the joint is the end of the segment before it
-        return Test(Margin.JOINT, (segment - 1) % len(orbit.word), surface)
+        return Test(Margin.JOINT, (segment - 1) % len(orbit.itinerary), surface)
     return Test(Margin.JOINT if place == JOINT else Margin.INTERIOR, segment, surface)
 
 
@@ -78,7 +78,9 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
     i, observable = test.segment, orbit.model.surface_by_name[test.surface].observable
     start = orbit.begins[i]
     begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
-    times, values = orbit.flow.stationary(orbit.word[i][0], observable, begin, start[1:], lasts)
+    times, values = orbit.flow.stationary(
+        orbit.itinerary[i][0], observable, begin, start[1:], lasts
+    )
     if len(times) == 0:
         return float("nan")
     level = orbit.flow.level(test.surface)
@@ -86,7 +88,7 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
 
 
 def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
-    """Tell whether margins of two words for one motion vanish at the same place, or its mirror image."""
+    """Tell whether margins of two itineraries for one motion vanish at the same place, or its mirror image."""
     time, surface = place_of(one, a)
     there, on = place_of(other, b)
     period = one.period
@@ -100,8 +102,8 @@ def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
     return symmetry.surfaces[on] == surface and gap < _SAME_TIME
 
 
-def words_at(special: SpecialPoint) -> Iterator[Orbit]:
-    """Yield the orbits of all words without holds that can follow the sliding event of a point."""
+def itineraries_at(special: SpecialPoint) -> Iterator[Orbit]:
+    """Yield the orbits of all itineraries without holds that can follow the sliding event of a point."""
     if special.meets is Kind.T:
         free = canonical(special.orbit)
         other = moved(free) if free is special.orbit else free
@@ -116,7 +118,7 @@ def words_at(special: SpecialPoint) -> Iterator[Orbit]:
 
 
 def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation | None:
-    """Return the condition of a curve in another word for the motion at a point; None if it has none."""
+    """Return the condition of a curve in another itinerary for the motion at a point; None if it has none."""
     if problem.test is None:
         if orbit.system.half is not problem.system.half:
             return None
@@ -134,7 +136,7 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
 
 
 def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
-    """Return the tangency of a motion in another word for it; None where none of its segments touches."""
+    """Return the tangency of a motion in another itinerary for it; None where none of its segments touches."""
     try:
         place = _tangent_at(one, test)
     except ParameterError:
@@ -159,7 +161,7 @@ def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float)
     symmetric one that it has met.
     """
     ahead = tip.direction / problem.box.widths
-    for orbit in words_at(special):
+    for orbit in itineraries_at(special):
         event = again(problem, special, orbit)
         if event is None:
             continue

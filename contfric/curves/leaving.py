@@ -5,7 +5,7 @@ point                               curves that leave
 ==================================  ============================================================
 a smooth event on a sliding one     the curve of SN, BP or PD
 a sliding event on a smooth one     the curve of the sliding event, both ways
-two sliding events                  in every word that can follow either or both of them: the
+two sliding events                  in every itinerary that can follow either or both of them: the
                                     curve of each margin that vanishes there, where admissible
 SN-PD, SN-BP                        the curve of the other one
 degenerate BP, PD                   from the symmetric (undoubled) side the fold curve of the
@@ -36,7 +36,7 @@ from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.points import Point
 from contfric.continuation.vertices import symmetric_part, undoubled_part
 from contfric.curves.curve import CurvePart
-from contfric.curves.going_on import Start, prove, starts_of, words_at
+from contfric.curves.going_on import Start, itineraries_at, prove, starts_of
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Box, Problem, border_of, problem_of
 from contfric.curves.special import CodimTwo, SpecialPoint
@@ -70,9 +70,9 @@ def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator
 
 
 def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
-    """Yield the curves of all margins that vanish at a point, in all words for the motion there."""
+    """Yield the curves of all margins that vanish at a point, in all itineraries for the motion there."""
     seen: set[tuple[int, Test]] = set()  # systems are built once each
-    for orbit in (special.orbit, *words_at(special), *_words_of_own(special, problem)):
+    for orbit in (special.orbit, *itineraries_at(special), *_itineraries_of_own(special, problem)):
         for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
             if not abs(value) < _VANISHES or (id(orbit.system), test) in seen:
                 continue
@@ -82,24 +82,24 @@ def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterato
             yield from starts_of(event, problem.box, largest)
 
 
-def _words_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orbit]:
-    """Yield the words that follow the curve's own event, and those that follow both."""
+def _itineraries_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orbit]:
+    """Yield the itineraries that follow the curve's own event, and those that follow both."""
     if problem.test is None:
         return
     kind = kind_of_margin(problem.system, problem.test, special.orbit)
     own = replace(special, meets=kind, tests=(problem.test,))
-    for orbit in words_at(own):
+    for orbit in itineraries_at(own):
         yield orbit
         for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
             if abs(value) < _VANISHES:
                 meets = kind_of_margin(orbit.system, test, orbit)
                 both = replace(own, orbit=orbit, meets=meets, tests=(test,))
                 with suppress(ContfricError):
-                    yield from words_at(both)
+                    yield from itineraries_at(both)
 
 
-def other_words(part: CurvePart, largest: float) -> Iterator[Start]:
-    """Yield the starts of a CS curve in the other words for its motion, from its middle.
+def other_itineraries(part: CurvePart, largest: float) -> Iterator[Start]:
+    """Yield the starts of a CS curve in the other itineraries for its motion, from its middle.
 
     The motion is the same, but its neighbours are others: they have their own folds and doublings there.
     """
@@ -109,7 +109,7 @@ def other_words(part: CurvePart, largest: float) -> Iterator[Start]:
     orbit = problem.orbit(part.joints[k], part.values[k])
     tests = tuple(problem.system.tests[int(row)] for row in problem.condition.pinned)
     here = SpecialPoint(CodimTwo.MEETS, "", orbit.params, orbit, Kind.CS, tests)
-    for other in words_at(here):
+    for other in itineraries_at(here):
         for test, value in zip(other.system.tests, other.margins, strict=True):
             if abs(value) < _VANISHES and kind_of_margin(other.system, test, other) is Kind.CS:
                 event = Bifurcation(Kind.CS, other.params, other, (test,))
@@ -191,12 +191,12 @@ def _tangential_release(special: SpecialPoint, problem: Problem, largest: float)
         return
     sticks = [
         i
-        for i, (mode, _) in enumerate(edited.system.word)
+        for i, (mode, _) in enumerate(edited.system.itinerary)
         if edited.model.mode_by_name[mode].sliding
         and abs(edited.ends[i, 0] - edited.cycle[i, 0]) < _VANISHES
     ]
     for i in sticks:
-        test = Test(Margin.EXIT, i, edited.system.word[i][1])
+        test = Test(Margin.EXIT, i, edited.system.itinerary[i][1])
         try:
             own = problem_of(Bifurcation(Kind.AS, edited.params, edited, (test,)), problem.box)
         except ContfricError:

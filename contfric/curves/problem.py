@@ -305,9 +305,9 @@ def _chosen(bifurcation: Bifurcation) -> Test:
 
 def _tangential(test: Test, orbit: Orbit) -> Test | None:
     """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
-    model, word = orbit.model, orbit.system.word
+    model, itinerary = orbit.model, orbit.system.itinerary
     if test.margin is not Margin.JOINT or not (
-        model.filippov or word[test.segment][1] in model.reset_by_surface
+        model.filippov or itinerary[test.segment][1] in model.reset_by_surface
     ):
         return None
     exits = (
@@ -343,10 +343,10 @@ def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]
     start, end = orbit.begins[segment], orbit.ends[segment]
-    mode, duration = orbit.word[segment][0], float(end[0] - start[0])
+    mode, duration = orbit.itinerary[segment][0], float(end[0] - start[0])
     _, values = orbit.flow.stationary(mode, test.surface, float(start[0]), start[1:], duration)
     reached: list[tuple[float, int, str]] = []
-    entry, exit_ = orbit.word[segment - 1][1], orbit.word[segment][1]
+    entry, exit_ = orbit.itinerary[segment - 1][1], orbit.itinerary[segment][1]
     ends = {START: (start, entry), JOINT: (end, exit_)}
     for surface in named:
         level = orbit.flow.level(surface.name)

@@ -230,8 +230,8 @@ def trace_curve_side(
 
 
 def _is_same(one: Problem, other: Problem) -> bool:
-    """Tell whether two problems follow the same condition in the same word."""
-    return one.test == other.test and one.system.word == other.system.word
+    """Tell whether two problems follow the same condition in the same itinerary."""
+    return one.test == other.test and one.system.itinerary == other.system.itinerary
 
 
 def _went_to_its_end(side: CurveSide) -> bool:

@@ -111,11 +111,11 @@ def _ellipse(event: HopfPoint, amplitude: float) -> Orbit | None:
     except ContfricError:
         return None
     middle = at.state + moved * centre.drift
-    word, phases = _cut(event, middle, vector, amplitude)
+    itinerary, phases = _cut(event, middle, vector, amplitude)
     period = 2.0 * math.pi / centre.frequency
     rows = [[t, *_point(centre, middle, amplitude, centre.frequency * t)] for t in phases]
     joints = clocked(model, np.array(rows), phases[0] + period)
-    return Orbit(build_system(model, word, 1), joints, vector, np.inf, Status.NOT_CONVERGED)
+    return Orbit(build_system(model, itinerary, 1), joints, vector, np.inf, Status.NOT_CONVERGED)
 
 
 def _point(centre: Centre, middle: FloatArray, amplitude: float, angle: float) -> FloatArray:
@@ -125,7 +125,7 @@ def _point(centre: Centre, middle: FloatArray, amplitude: float, angle: float) -
 def _cut(
     event: HopfPoint, middle: FloatArray, vector: FloatArray, amplitude: float
 ) -> tuple[tuple[tuple[str, str], ...], tuple[float, float]]:
-    """Return the word of the cycle at a section that cuts it, and the times of its crossings, upwards first.
+    """Return the itinerary of the cycle at a section that cuts it, and the times of its crossings, upwards first.
 
     Raises
     ------

@@ -28,7 +28,7 @@ from contfric.models import ModelSource, load_model
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity
 
@@ -309,7 +309,7 @@ class _Problem:
         vector = self.model.vector(params)
         near = self.near.get(condition)
         if near is not None:
-            refined = polish(replace(near, vector=vector))
+            refined = refine(replace(near, vector=vector))
             if refined.converged and refined.admissible and refined.stable:
                 self.near[condition] = refined
                 return refined

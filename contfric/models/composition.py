@@ -14,7 +14,7 @@ ways through a surface    (what else holds where it is met, mode that follows): 
 ========================  =================================================================================
 
 The engine's numbers of modes (:class:`contfric.models.composed.ComposedModel`) are given in the order of the
-first visit; words and signatures have the names.
+first visit; itineraries and signatures have the names.
 """
 
 from __future__ import annotations

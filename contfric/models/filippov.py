@@ -181,14 +181,14 @@ class _Sliding:
 
 def _add(found: dict[str, Any], sliding: _Sliding) -> None:
     """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode."""
-    own, word = sliding.name, as_identifier(sliding.name)
-    up = f"{word}_rate"
+    own, itinerary = sliding.name, as_identifier(sliding.name)
+    up = f"{itinerary}_rate"
     found["observables"][up] = sliding.text(sliding.rate_up)
     found["surfaces"][f"{own}-"] = {"observable": up, "level": "0"}
     if sliding.constant:
         low = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
     else:
-        below = f"{word}_below"
+        below = f"{itinerary}_below"
         found["observables"][below] = sliding.text(sliding.rate_down)
         low = {"observable": below, "level": "0"}
     found["surfaces"][f"{own}+"] = low

@@ -1,7 +1,7 @@
 """Mass, damping and stiffness of a structure, and what follows from them.
 
 A matrix is a list of rows of expressions, a list of its diagonal, one expression (times identity), or the
-word ``identity``; in a file of a model also ``{file: frame.npz, array: M}``.
+itinerary ``identity``; in a file of a model also ``{file: frame.npz, array: M}``.
 """
 
 from __future__ import annotations

@@ -101,8 +101,8 @@ class _Writer:
         if isinstance(node, ast.UnaryOp):
             return f"(not {self._condition(node.operand)})"
         if isinstance(node, ast.BoolOp):
-            word = " or " if isinstance(node.op, ast.Or) else " and "
-            return "(" + word.join(self._condition(part) for part in node.values) + ")"
+            itinerary = " or " if isinstance(node.op, ast.Or) else " and "
+            return "(" + itinerary.join(self._condition(part) for part in node.values) + ")"
         assert isinstance(node, ast.Compare)
         sides = [self.text(side) for side in (node.left, *node.comparators)]
         pairs = zip(node.ops, sides, sides[1:], strict=False)

@@ -1,4 +1,4 @@
-"""How the segments of a word begin: behind a reset, on their own exit surface, or as any."""
+"""How the segments of an itinerary begin: behind a reset, on their own exit surface, or as any."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from contfric.orbit.holds import Hold
 from contfric.orbit.structure import mirror_mode, mode_domains
 from contfric.signature.holds import is_hold, mirror_exit
 
-Word = tuple[tuple[str, str], ...]
+Itinerary = tuple[tuple[str, str], ...]
 
 
-def first_entry(model: Model, word: Word, half: bool) -> str:
+def first_entry(model: Model, itinerary: Itinerary, half: bool) -> str:
     """Return the surface through which the first segment of a turn is entered."""
     if not half or model.symmetry is None:
-        return word[-1][1]
+        return itinerary[-1][1]
     inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-    return mirror_exit(word[-1][1], inverse)
+    return mirror_exit(itinerary[-1][1], inverse)
 
 
 def beginnings(
     model: Model,
-    word: Word,
+    itinerary: Itinerary,
     exits: list[str],
     entered: list[str],
     half: bool,
     held: dict[int, Hold],
 ) -> dict[str, NDArray[np.int64]]:
     """How holds are left and segments begin: ``departs``, ``resets`` and ``returns`` of a layout."""
-    modes = [mode for mode, _ in word]
+    modes = [mode for mode, _ in itinerary]
     before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
-    departs, resets, returns = (np.full(len(word), empty) for empty in (-1, -1, 0))
+    departs, resets, returns = (np.full(len(itinerary), empty) for empty in (-1, -1, 0))
     for i, row in enumerate(zip(modes, before, exits, entered, strict=True)):
         if i in held:
             departs[i] = model.mode_index[held[i].departs]
@@ -69,13 +69,13 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
 
 
 def entry_rows(
-    model: Model, word: Word, entered: list[str], domains: tuple[str, ...]
+    model: Model, itinerary: Itinerary, entered: list[str], domains: tuple[str, ...]
 ) -> list[tuple[int, ...]]:
     """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
     rows: list[tuple[int, ...]] = []
     for i, surface in enumerate(entered):
         reset = model.reset_by_surface.get(surface)
-        if reset is None or word[i][0] in model.chatter_by_mode:
+        if reset is None or itinerary[i][0] in model.chatter_by_mode:
             continue  # what holds at rest on a wall need not hold before the impacts have come to rest
         led = {
             target
@@ -83,7 +83,7 @@ def entry_rows(
             if met == surface
             for target in found
         }
-        behind = [d for d in mode_domains(model, word[i][0]) if d in led]
+        behind = [d for d in mode_domains(model, itinerary[i][0]) if d in led]
         for k, other in enumerate(model.surfaces):
             signs = {
                 model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or behind)

@@ -1,6 +1,6 @@
 """What never changes along an orbit: where a contact rests that never slips, the offset of a stuck slider.
 
-A linear function ``w . y`` whose rate vanishes in all modes of a word keeps its value: the orbits form a
+A linear function ``w . y`` whose rate vanishes in all modes of an itinerary keeps its value: the orbits form a
 continuum, with a multiplier 1 (-1 of a half turn, if the symmetry turns it over) for each such w, which is a
 left eigenvector of the linear map of a turn. The value is a given datum: Newton's method does not move it,
 and the trivial multiplier is taken away exactly (:mod:`contfric.orbit.spectrum`). In the matrix of the
@@ -21,7 +21,7 @@ from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.evaluate import Sampler, defaults, floats
 
-Word = tuple[tuple[str, str], ...]
+Itinerary = tuple[tuple[str, str], ...]
 #: Parameters, time, state and rate.
 Motion = tuple[FloatArray, float, FloatArray, FloatArray]
 #: A rate this small, relative to the largest one, is zero: rounding of formulas of moderate size.
@@ -34,8 +34,8 @@ _MORE = 3
 _MOVED = 1.07
 
 
-def conserved(model: Model, word: Word) -> FloatArray:
-    """Return the directions w of the linear functions that a word conserves.
+def conserved(model: Model, itinerary: Itinerary) -> FloatArray:
+    """Return the directions w of the linear functions that an itinerary conserves.
 
     Orthonormal rows, shape (k, n).
     """
@@ -43,12 +43,14 @@ def conserved(model: Model, word: Word) -> FloatArray:
     if not model.definition:  # of functions of its own: such a model says nothing of its fields
         return np.empty((0, n))
     changes, places = np.empty((n, 0)), np.empty((n, 0))
-    for mode in dict.fromkeys(mode for mode, _ in word):
+    for mode in dict.fromkeys(mode for mode, _ in itinerary):
         rates, apart = _along(model, mode)
         changes, places = np.hstack([changes, rates]), np.hstack([places, apart])
         if not model.composed and _rank(changes) == n:  # else each mode has few columns
             return np.empty((0, n))
-    for surface in dict.fromkeys(exit_ for _, exit_ in word if exit_ in model.reset_by_surface):
+    for surface in dict.fromkeys(
+        exit_ for _, exit_ in itinerary if exit_ in model.reset_by_surface
+    ):
         changes = np.hstack([changes, _jumps(model, surface)])
     left, sizes, _ = np.linalg.svd(changes, full_matrices=not model.composed)
     rank = int(np.sum(sizes > _ZERO))
@@ -94,7 +96,7 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
     found = [(p, t, y, _without_rounding(rate, y)) for p, t, y, rate in found]
     apart = [y - found[0][2] for _, _, y, _ in found[1:]]
     changes = _columns([rate for *_, rate in found], len(model.states))
-    if model.composed:  # many words have this mode: directions that say the same
+    if model.composed:  # many itineraries have this mode: directions that say the same
         left, sizes, _ = np.linalg.svd(changes, full_matrices=False)
         changes = left[:, : int(np.sum(sizes > _ZERO))]
     return changes, _columns(apart, len(model.states))

@@ -195,7 +195,7 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
     motion creeps towards the orbit as slowly as they say.
     """
     for lag, turns, mismatch in recurrences(trajectory):
-        if creeps(trajectory, lag):  # near an orbit of another word
+        if creeps(trajectory, lag):  # near an orbit of another itinerary
             return None
         if mismatch > _EXACT and not final:
             return _crept_to(trajectory, lag, turns)
@@ -284,18 +284,18 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     joints = np.column_stack(
         [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
     )
-    word, end = trajectory.word[first + 1 :], float(trajectory.times[-1])
+    itinerary, end = trajectory.itinerary[first + 1 :], float(trajectory.times[-1])
     if not model.autonomous:
         end = float(joints[0, 0]) + turns * period
-    smooth = is_smooth(model, word)
+    smooth = is_smooth(model, itinerary)
     if model.autonomous and smooth:
-        turns = loops(model, word, joints, end, vector)
-    word, joints, end = without_sections(model, word, joints, end, vector, turns)
+        turns = loops(model, itinerary, joints, end, vector)
+    itinerary, joints, end = without_sections(model, itinerary, joints, end, vector, turns)
     if model.autonomous and not smooth:
-        turns = len(word) // primitive_length(word)
+        turns = len(itinerary) // primitive_length(itinerary)
     joints = clocked(model, joints, end)
     try:
-        system = build_system(model, word, turns)
+        system = build_system(model, itinerary, turns)
     except ValueError:
         return None
     return Orbit(system, joints, vector, np.inf, Status.NOT_CONVERGED)

@@ -13,7 +13,7 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.structure import is_section
 from contfric.orbit.system import build_system
 from contfric.signature import crossing
@@ -38,36 +38,36 @@ def full_form(orbit: Orbit) -> Orbit:
     whole = orbit.as_whole()
     domains = whole.signature.segments
     joints: list[FloatArray] = []
-    word: list[tuple[str, str]] = []
+    itinerary: list[tuple[str, str]] = []
     at = 0
-    for i, (mode, exit_) in enumerate(whole.word):
+    for i, (mode, exit_) in enumerate(whole.itinerary):
         place = whole.cycle[i].copy()
-        entry = whole.word[i - 1][1]
+        entry = whole.itinerary[i - 1][1]
         while True:
             joints.append(place)
             here, there = domains[at], domains[(at + 1) % len(domains)]
             surface = crossing(whole.model, here, there)
             at += 1
             if surface is None or (surface == exit_ and _last(whole, domains, at, i)):
-                word.append((mode, exit_))
+                itinerary.append((mode, exit_))
                 break
-            word.append((mode, surface))
+            itinerary.append((mode, surface))
             place = _crossing_point(whole, mode, surface, place, entry)
             entry = surface
-    system = build_system(whole.model, tuple(word), whole.periods, domains=domains)
+    system = build_system(whole.model, tuple(itinerary), whole.periods, domains=domains)
     start = clocked(whole.model, np.array(joints), float(joints[0][0]) + whole.period)
     guess = Orbit(system, start, whole.vector.copy(), np.inf, Status.NOT_CONVERGED)
-    return polish(guess, damped=False)
+    return refine(guess, damped=False)
 
 
 def _last(orbit: Orbit, domains: tuple[str, ...], at: int, i: int) -> bool:
-    """Tell whether the segment of the reduced word ends with the domain just passed."""
+    """Tell whether the segment of the reduced itinerary ends with the domain just passed."""
     model = orbit.model
     following = domains[at % len(domains)]
     through = crossing(model, domains[at - 1], following)
     assert through is not None
-    same_mode = model.domain_by_name[following].mode == model.whole_mode(orbit.word[i][0])
-    return not same_mode or is_section(model, *orbit.word[i])
+    same_mode = model.domain_by_name[following].mode == model.whole_mode(orbit.itinerary[i][0])
+    return not same_mode or is_section(model, *orbit.itinerary[i])
 
 
 def _crossing_point(

@@ -24,12 +24,12 @@ from contfric.signature.holds import (
 #: In the array of pins: a segment that is no hold, and a hold after a touch; else the surface.
 NO_PIN, TOUCH_PIN = -1, -2
 
-Word = tuple[tuple[str, str], ...]
+Itinerary = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Hold:
-    """One hold of a word.
+    """One hold of an itinerary.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Hold:
     leaves: str
 
 
-def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
+def holds_of(model: Model, itinerary: Itinerary) -> tuple[Hold, ...]:
     """Return the holds of one turn.
 
     Raises
@@ -57,12 +57,12 @@ def holds_of(model: Model, word: Word) -> tuple[Hold, ...]:
         hold, or the model has no such hold.
     """
     found = []
-    for index, (mode, exit_) in enumerate(word):
+    for index, (mode, exit_) in enumerate(itinerary):
         if not is_hold(exit_):
             continue
-        before = word[index - 1]
+        before = itinerary[index - 1]
         if index == 0 or is_hold(before[1]) or not known_hold(exit_, model):
-            raise ValueError(f"'{exit_}' cannot stand at place {index + 1} of {word}")
+            raise ValueError(f"'{exit_}' cannot stand at place {index + 1} of {itinerary}")
         rest = model.domains_of(mode)[0]
         found.append(
             Hold(

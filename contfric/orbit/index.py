@@ -107,13 +107,13 @@ def _pins(system: System, a: FloatArray, b: FloatArray) -> dict[int, _Pin]:
     """
     model, pins = system.model, {}
     for number, hold in enumerate(system.holds):
-        h, mode = hold.segment, system.word[hold.segment][0]
+        h, mode = hold.segment, system.itinerary[hold.segment][0]
         nothing = np.zeros(a.shape[1])
         if hold.pin is not None:
             sign = inside_sign(model, mode, hold.pin)
             pins[h] = _Pin(number, h, sign * a[h, -1], nothing)
         else:
-            before, exit_ = system.word[h - 1]
+            before, exit_ = system.itinerary[h - 1]
             sign = inside_sign(model, before, exit_) * (1 if hold.after_rest else -1)
             pins[h] = _Pin(number, h - 1, sign * a[h - 1, -1], sign * b[h - 1, -1])
             a[h - 1, -1], b[h - 1, -1] = nothing, a[h, -1]

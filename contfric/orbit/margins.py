@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.models.definition import Model
-from contfric.orbit.holds import Hold, Word
+from contfric.orbit.holds import Hold, Itinerary
 
 
 class Margin(str, Enum):
@@ -30,7 +30,7 @@ class Test:
     surface: str
 
 
-def lasting_segments(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
+def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tuple[int, str]]:
     """Segments that no other margin keeps from shrinking through zero, each with the surface that it ends on.
 
     A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
@@ -38,18 +38,18 @@ def lasting_segments(word: Word, holds: tuple[Hold, ...]) -> list[tuple[int, str
     next begins: where it shrinks to nothing, the acceleration with which the first is left has one.
     """
     found: list[tuple[int, str]] = []
-    left = {(hold.segment + 1) % len(word) for hold in holds}
+    left = {(hold.segment + 1) % len(itinerary) for hold in holds}
     for hold in holds:
-        before = (hold.segment - 1) % len(word)
+        before = (hold.segment - 1) % len(itinerary)
         if hold.after_rest:
-            found += [(before, word[before][1]), (hold.segment, hold.leaves)]
+            found += [(before, itinerary[before][1]), (hold.segment, hold.leaves)]
         elif hold.pin is None and before in left:
-            found.append((before, word[before][1]))
+            found.append((before, itinerary[before][1]))
     return found
 
 
 def double_zeros(
-    model: Model, word: Word, half: bool, holds: tuple[Hold, ...]
+    model: Model, itinerary: Itinerary, half: bool, holds: tuple[Hold, ...]
 ) -> list[tuple[Test, int]]:
     """Margins with a double zero where a segment that must last has no length, each with that segment.
 
@@ -57,17 +57,17 @@ def double_zeros(
     acceleration with which a hold is left into a slide up to the touch of the next one.
     """
     pairs: list[tuple[Test, int]] = []
-    left = {(hold.segment + 1) % len(word) for hold in holds}
+    left = {(hold.segment + 1) % len(itinerary) for hold in holds}
     for hold in holds:
-        before = (hold.segment - 1) % len(word)
+        before = (hold.segment - 1) % len(itinerary)
         if hold.after_rest:
-            surface = word[before][1]
+            surface = itinerary[before][1]
             pairs.append((Test(Margin.JOINT, hold.segment, surface), hold.segment))
             if before == 0 and half and model.symmetry is not None:  # its stop is a mirror image
                 back = {image: name for name, image in model.symmetry.surfaces.items()}
                 surface = back[surface]
-            pairs.append((Test(Margin.JOINT, (before - 1) % len(word), surface), before))
+            pairs.append((Test(Margin.JOINT, (before - 1) % len(itinerary), surface), before))
         elif hold.pin is None and before in left:
-            stopped = next(h for h in holds if (h.segment + 1) % len(word) == before)
+            stopped = next(h for h in holds if (h.segment + 1) % len(itinerary) == before)
             pairs.append((Test(Margin.EXIT, stopped.segment, stopped.leaves), before))
     return pairs

@@ -2,7 +2,7 @@
 
 A linear function ``w . y`` whose rate is, along some modes, the height of a surface on whose positive side
 all of these lie, and zero along all others, grows whenever a motion is in one of them. It is the same after
-a period, so that they last for no time: what solves the equations of such a word are the orbits of the word
+a period, so that they last for no time: what solves the equations of such an itinerary are the orbits of the itinerary
 without these modes that just touch their limit, for every value of the parameter.
 """
 
@@ -15,15 +15,15 @@ import numpy as np
 
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.conserved import conserved, motions_in
-from contfric.orbit.system import Word
+from contfric.orbit.system import Itinerary
 
 #: How well rates are explained by heights, relative to the largest of these: rounding.
 _ZERO = 1e-9
 
 
 @cache
-def only_grows(model: Model, word: Word) -> tuple[str, ...]:
-    """Return modes of a word that periodic motion enters for no time, as a quantity only grows there.
+def only_grows(model: Model, itinerary: Itinerary) -> tuple[str, ...]:
+    """Return modes of an itinerary that periodic motion enters for no time, as a quantity only grows there.
 
     Examples
     --------
@@ -38,21 +38,23 @@ def only_grows(model: Model, word: Word) -> tuple[str, ...]:
     """
     if not model.definition:
         return ()
-    for surface, modes in _one_sided(model, word):
-        others = tuple(pair for pair in word if pair[0] not in modes)
-        dropped = {exit_ for mode, exit_ in word if mode in modes}
+    for surface, modes in _one_sided(model, itinerary):
+        others = tuple(pair for pair in itinerary if pair[0] not in modes)
+        dropped = {exit_ for mode, exit_ in itinerary if mode in modes}
         if not others or dropped & model.reset_by_surface.keys():
             continue
         still = conserved(model, others)
-        if len(still) > len(conserved(model, word)) and _explained(model, still, surface, modes):
+        if len(still) > len(conserved(model, itinerary)) and _explained(
+            model, still, surface, modes
+        ):
             return modes
     return ()
 
 
-def _one_sided(model: Model, word: Word) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield surfaces on which segments of a word end, and its modes, where these lie on one side."""
-    named = dict.fromkeys(mode for mode, _ in word)
-    for surface in dict.fromkeys(exit_ for _, exit_ in word if exit_ in model.surface_by_name):
+def _one_sided(model: Model, itinerary: Itinerary) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield surfaces on which segments of an itinerary end, and its modes, where these lie on one side."""
+    named = dict.fromkeys(mode for mode, _ in itinerary)
+    for surface in dict.fromkeys(exit_ for _, exit_ in itinerary if exit_ in model.surface_by_name):
         sides = {m: {d.signs.get(surface, 0) for d in model.domains_of(m)} for m in named}
         on_one = {mode: min(own) for mode, own in sides.items() if len(own) == 1 and own != {0}}
         if len(set(on_one.values())) == 1:

@@ -15,14 +15,14 @@ from contfric.base.tally import tally
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
+from contfric.orbit.itineraries import half_of, mirror_pairs, whole_of
 from contfric.orbit.linear import of_two_halves, pencil_of_turn
 from contfric.orbit.measured import MeasuredOrbit
 from contfric.orbit.reading import read_signature
 from contfric.orbit.samples import samples, state_within
 from contfric.orbit.slack import margin_slack, no_time
 from contfric.orbit.stops import reach_of, stops_of
-from contfric.orbit.system import System, Word, build_system
-from contfric.orbit.words import half_of, mirror_pairs, whole_of
+from contfric.orbit.system import Itinerary, System, build_system
 from contfric.signature import Signature
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class Orbit(MeasuredOrbit):
 
     @property
     def periods(self) -> int:
-        """Number of excitation periods of the orbit; without excitation, how often its word repeats."""
+        """Number of excitation periods of the orbit; without excitation, how often its itinerary repeats."""
         return self.system.periods
 
     @property
@@ -122,9 +122,9 @@ class Orbit(MeasuredOrbit):
     # ------------------------------------------------------------------ the whole cycle
 
     @cached_property
-    def word(self) -> Word:
+    def itinerary(self) -> Itinerary:
         """Mode and exit surface of each segment of the whole orbit."""
-        return whole_of(self.model, self.system.word, self.system.half)
+        return whole_of(self.model, self.system.itinerary, self.system.half)
 
     @cached_property
     def cycle(self) -> FloatArray:
@@ -154,7 +154,7 @@ class Orbit(MeasuredOrbit):
             return self.cycle
         begins = self.cycle.copy()
         for i, joint in enumerate(self.cycle):
-            entry = self.word[i - 1][1]
+            entry = self.itinerary[i - 1][1]
             if entry in resets:
                 begins[i, 1:] = self.flow.reset(entry, float(joint[0]), joint[1:])
         return begins
@@ -165,12 +165,14 @@ class Orbit(MeasuredOrbit):
 
     @cached_property
     def _whole(self) -> Orbit:
-        system = build_system(self.model, self.word, self.periods)
+        system = build_system(self.model, self.itinerary, self.periods)
         return replace(self, system=system, joints=self.cycle)
 
     def as_half(self) -> Orbit:
         """Return a symmetric orbit as a problem on its half; any other orbit as it is."""
-        half = None if self.system.half else half_of(self.model, self.system.word, self.periods)
+        half = (
+            None if self.system.half else half_of(self.model, self.system.itinerary, self.periods)
+        )
         if half is None or not self.symmetric:
             return self
         system = build_system(self.model, half, self.periods, half=True)
@@ -182,10 +184,14 @@ class Orbit(MeasuredOrbit):
         whole = self.as_whole()
         second = whole.joints.copy()
         second[:, 0] += whole.period
-        if not self.model.autonomous and all(pair in self.model.sections for pair in whole.word):
+        if not self.model.autonomous and all(
+            pair in self.model.sections for pair in whole.itinerary
+        ):
             # a smooth cycle is found by one crossing each way, however long it is
-            return replace(whole, system=build_system(self.model, whole.word, self.periods * 2))
-        system = build_system(self.model, whole.word * 2, self.periods * 2)
+            return replace(
+                whole, system=build_system(self.model, whole.itinerary, self.periods * 2)
+            )
+        system = build_system(self.model, whole.itinerary * 2, self.periods * 2)
         joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
         return replace(whole, system=system, joints=joints)
 
@@ -200,8 +206,8 @@ class Orbit(MeasuredOrbit):
         if not self.model.autonomous:
             joints[:, 0] += symmetry.fraction * self.period / self.periods
         joints[:, 1:] = self.joints[:, 1:] @ symmetry.array().T
-        word = mirror_pairs(self.model, self.system.word)
-        system = build_system(self.model, word, self.periods, self.system.half)
+        itinerary = mirror_pairs(self.model, self.system.itinerary)
+        system = build_system(self.model, itinerary, self.periods, self.system.half)
         return replace(self, system=system, joints=joints)
 
     @cached_property
@@ -212,10 +218,10 @@ class Orbit(MeasuredOrbit):
 
     @cached_property
     def mirror_distance(self) -> float:
-        """Largest distance of a joint to its mirror image; infinite if the words differ."""
+        """Largest distance of a joint to its mirror image; infinite if the itineraries differ."""
         if self.system.half:
             return 0.0
-        if half_of(self.model, self.system.word, self.periods) is None:
+        if half_of(self.model, self.system.itinerary, self.periods) is None:
             return float(np.inf)
         assert self.model.symmetry is not None
         n = len(self.joints) // 2
@@ -289,10 +295,10 @@ class Orbit(MeasuredOrbit):
 
     def violations(self) -> list[str]:
         """Return what makes the orbit not admissible, one line each."""
-        word, margins = self.system.word, self.margins
+        itinerary, margins = self.system.itinerary, self.margins
         slacks = margin_slack(self.system, self.joints)
         found = [
-            f"segment {test.segment + 1} ({word[test.segment][0]}): "
+            f"segment {test.segment + 1} ({itinerary[test.segment][0]}): "
             f"{test.margin.value} margin at {test.surface} is {margin:.3g}"
             for test, margin, slack in zip(self.system.tests, margins, slacks, strict=True)
             if not margin > slack
@@ -300,7 +306,7 @@ class Orbit(MeasuredOrbit):
         lasts = self.ends[:, 0] - self.cycle[:, 0]
         short = np.flatnonzero(lasts <= -no_time(self.system, self.joints, margins))
         return found + [
-            f"segment {k + 1} ({self.word[k][0]}): it lasts {lasts[k]:.3g}" for k in short
+            f"segment {k + 1} ({self.itinerary[k][0]}): it lasts {lasts[k]:.3g}" for k in short
         ]
 
     # ------------------------------------------------------------------ what is seen

@@ -1,6 +1,6 @@
 """The motion that takes prescribed outcomes at its joints, admissible or not, compiled.
 
-Where a mode ends at a surface, the word says what follows, not the state: each branch of a return map with a
+Where a mode ends at a surface, the itinerary says what follows, not the state: each branch of a return map with a
 jump is so continued beyond the jump.
 """
 
@@ -47,13 +47,13 @@ def next_joint(functions, layout, i, joint, p, within, none, empty, met):  # typ
 
 
 @kernel(types.boolean(FlowType, LayoutType, matrix, vector, i8, vector))
-def follow_word(functions, layout, joints, p, rounds, end):  # type: ignore[no-untyped-def]
-    """Follow the motion that takes the outcomes of a word from its first joint; False if it cannot.
+def follow_itinerary(functions, layout, joints, p, rounds, end):  # type: ignore[no-untyped-def]
+    """Follow the motion that takes the outcomes of an itinerary from its first joint; False if it cannot.
 
     Parameters
     ----------
     joints : those of the last round are written, shape (N, 1 + n)
-    rounds : how often the word is run through; the clock is put back after each
+    rounds : how often the itinerary is run through; the clock is put back after each
     end : where the last round ends, written, shape (1 + n,)
     """
     count, m = joints.shape

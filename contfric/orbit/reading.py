@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contfric.models.definition import Domain, FloatArray
+from contfric.orbit.itineraries import decode, end_domain, passed_domains
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
-from contfric.orbit.words import decode, end_domain, passed_domains
 from contfric.signature import Signature
 from contfric.signature.holds import TOUCH, domains_after, is_hold
 from contfric.signature.impacts import impact_at, mirror_name
@@ -55,13 +55,13 @@ def _paths(orbit: Orbit, labels: IntArray) -> list[list[str]]:
     """Domains of each segment of one turn."""
     model, system = orbit.model, orbit.system
     surfaces = [s.name for s in model.surfaces]
-    ends, word = _end_domains(orbit), orbit.word
-    crossed: list[list[str]] = [[] for _ in system.word]
+    ends, itinerary = _end_domains(orbit), orbit.itinerary
+    crossed: list[list[str]] = [[] for _ in system.itinerary]
     for row, code in zip(system.layout.labels, labels, strict=True):
         crossed[row[0]] += decode(int(code), surfaces)
     return [
         [ends[i]]
-        if is_hold(word[i][1])
+        if is_hold(itinerary[i][1])
         else passed_domains(model, _start_domain(orbit, i, ends), ends[i], passed)
         for i, passed in enumerate(crossed)
     ]
@@ -71,7 +71,7 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
     """Domains of the whole orbit, with its holds and impacts between them."""
     model, system = orbit.model, orbit.system
     domains: list[str] = []
-    for path, (_, exit_) in zip(_paths(orbit, labels), system.word, strict=True):
+    for path, (_, exit_) in zip(_paths(orbit, labels), system.itinerary, strict=True):
         domains += [exit_] if is_hold(exit_) else path
         if exit_ in model.reset_by_surface:
             domains.append(impact_at(model, exit_))
@@ -84,29 +84,31 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
 
 def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     """Domain in which a segment of the whole orbit begins."""
-    model, word = orbit.model, orbit.word
-    mode, entry = word[i - 1]  # of the whole word: its last exit leads into the first
+    model, itinerary = orbit.model, orbit.itinerary
+    mode, entry = itinerary[i - 1]  # of the whole itinerary: its last exit leads into the first
     if model.composed:
-        return word[i][0]
+        return itinerary[i][0]
     if (
         mode in model.chatter_by_mode
     ):  # at rest on a wall no side of a section is told: look a little ahead
         begin, lasts = orbit.begins[i], orbit.ends[i][0] - orbit.begins[i][0]
         state = model.view(orbit.vector).state(
-            word[i][0], float(begin[0]), begin[1:].copy(), _AHEAD * lasts
+            itinerary[i][0], float(begin[0]), begin[1:].copy(), _AHEAD * lasts
         )
         signs = _signs_at(orbit, float(begin[0] + _AHEAD * lasts), state)
-        return _nearest([model.domain_by_name[d] for d in mode_domains(model, word[i][0])], signs)
+        return _nearest(
+            [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])], signs
+        )
     if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
     signs = _signs_at(orbit, float(begin[0]), begin[1:].copy())
     if is_hold(entry):
-        after = [model.domain_by_name[d] for d in domains_after(model, mode, word[i][0])]
+        after = [model.domain_by_name[d] for d in domains_after(model, mode, itinerary[i][0])]
         return _nearest(after, signs)
     for surface in model.reset_by_surface[entry].lands:
         del signs[surface]  # the joint lies on it to rounding; the transition says the side
-    own = [model.domain_by_name[d] for d in mode_domains(model, word[i][0])]
+    own = [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])]
     led = model.targets.get(
         (ends[i - 1], entry), ()
     )  # a surface met at the impact is on either side
@@ -127,15 +129,15 @@ def _nearest(domains: Sequence[Domain], signs: Mapping[str, int]) -> str:
 
 def _end_domains(orbit: Orbit) -> list[str]:
     """Domain in which each segment of the whole orbit ends."""
-    found, word, model = [], orbit.word, orbit.model
-    for i, (mode, exit_) in enumerate(word):
+    found, itinerary, model = [], orbit.itinerary, orbit.model
+    for i, (mode, exit_) in enumerate(itinerary):
         end = orbit.ends[i]
         signs = _signs_at(orbit, float(end[0]), end[1:].copy())
-        after, following = word[(i + 1) % len(word)]
+        after, following = itinerary[(i + 1) % len(itinerary)]
         if is_hold(exit_):
             found.append(mode_domains(model, mode)[0])
             continue
         if is_hold(following) and (mode == after or following != TOUCH):  # it leads beyond the hold
-            after = word[(i + 2) % len(word)][0]
+            after = itinerary[(i + 2) % len(itinerary)][0]
         found.append(end_domain(model, mode, exit_, after, signs))
     return found

@@ -19,7 +19,7 @@ _SAME = 1e-8
 def shortest(orbit: Orbit) -> Orbit:
     """Return the orbit of fewest periods that runs through the same motion; most often the same.
 
-    Without an excitation its word may repeat itself any number of times.
+    Without an excitation its itinerary may repeat itself any number of times.
 
     Examples
     --------
@@ -29,20 +29,20 @@ def shortest(orbit: Orbit) -> Orbit:
     1
     """
     whole = orbit.as_whole()
-    word, joints = whole.system.word, whole.joints
-    most = len(word) if whole.model.autonomous else whole.periods
+    itinerary, joints = whole.system.itinerary, whole.joints
+    most = len(itinerary) if whole.model.autonomous else whole.periods
     for turns in range(most, 1, -1):
         if most % turns:
             continue
         if (found := shortened(whole, turns)) is not None:
             return found
-        part, rest = divmod(len(word), turns)
-        if rest or word != word[:part] * turns:
+        part, rest = divmod(len(itinerary), turns)
+        if rest or itinerary != itinerary[:part] * turns:
             continue
         step = joints[part:] - joints[:-part]
         step[:, 0] -= whole.period / turns
         if np.max(np.abs(step)) < _SAME * (1.0 + np.max(np.abs(joints))):
-            system = build_system(whole.model, word[:part], max(1, whole.periods // turns))
+            system = build_system(whole.model, itinerary[:part], max(1, whole.periods // turns))
             first = clocked(whole.model, joints[:part], float(joints[part, 0]))
             return replace(whole, system=system, joints=first)
     return orbit

@@ -25,7 +25,7 @@ import numpy as np
 
 from contfric.models.definition import FloatArray, Model
 from contfric.models.view import FlowView
-from contfric.orbit.system import System, Word, following_modes
+from contfric.orbit.system import Itinerary, System, following_modes
 from contfric.signature.holds import is_hold
 
 #: Fields that differ by less than this share of each rate's size, at all states, are equal there: rounding.
@@ -58,14 +58,14 @@ def pass_when_due(
     ----------
     a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
     """
-    model, word = system.model, system.word
-    due = _due(model, word, system.half)
+    model, itinerary = system.model, system.itinerary
+    due = _due(model, itinerary, system.half)
     if not due:
         return
     view = FlowView(model, vector)
     for i, passage, following in due:
-        mode, exit_ = word[i]
-        last = i + 1 == len(word)
+        mode, exit_ = itinerary[i]
+        last = i + 1 == len(itinerary)
         end = _end(system, joints, view, i)
         slope = view.gradient(model.surface_by_name[exit_].observable, *end)
         if not _is_small(slope, b[i, :-1, 0]):
@@ -84,13 +84,15 @@ def pass_when_due(
 
 
 @cache
-def _due(model: Model, word: Word, half: bool) -> list[tuple[int, Passage, str]]:
+def _due(model: Model, itinerary: Itinerary, half: bool) -> list[tuple[int, Passage, str]]:
     """Return the joints at which the rate may vanish, with what the field does there and what follows."""
-    after = following_modes(model, word, half)
+    after = following_modes(model, itinerary, half)
     found: list[tuple[int, Passage, str]] = []
-    for i, ((mode, exit_), following) in enumerate(zip(word, after, strict=True)):
+    for i, ((mode, exit_), following) in enumerate(zip(itinerary, after, strict=True)):
         passage = passage_at(model, mode, exit_, following)
-        held = is_hold(word[(i + 1) % len(word)][1])  # what is held has equations of its own
+        held = is_hold(
+            itinerary[(i + 1) % len(itinerary)][1]
+        )  # what is held has equations of its own
         if passage is not Passage.JUMP and not held:
             found.append((i, passage, following))
     return found

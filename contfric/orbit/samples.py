@@ -22,7 +22,7 @@ _MOST_SAMPLES = 10_000_000
 def state_within(orbit: Orbit, i: int, duration: float) -> FloatArray:
     """Return the state in a segment of the whole orbit, a duration behind its start, shape (n,)."""
     start = orbit.begins[i]
-    return orbit.flow.state(orbit.word[i][0], float(start[0]), start[1:], duration)
+    return orbit.flow.state(orbit.itinerary[i][0], float(start[0]), start[1:], duration)
 
 
 def samples(
@@ -46,7 +46,7 @@ def samples(
         for k, duration in enumerate(np.linspace(0.0, end - start, count)):
             times.append(float(start + duration))
             states.append(state_within(orbit, i, float(duration)))
-            if k == count - 1:  # a segment begins and ends where its word says
+            if k == count - 1:  # a segment begins and ends where its itinerary says
                 path = path[-1:]
             elif k > 0:
                 path = _rest_of(orbit, path, times[-1], states[-1])

@@ -1,7 +1,7 @@
 """An orbit in one mode with joints on a section as well, for what follows when its other joints vanish.
 
 An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth behind the event.
-So that both are words of one motion, joints are put where the motion crosses a section.
+So that both are itineraries of one motion, joints are put where the motion crosses a section.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ def divided(whole: Orbit, turns: int) -> Orbit | None:
     One each way in each of the equal ``turns`` of the motion. None where there is no section, or where it is
     of no use.
     """
-    model, mode = whole.model, whole.model.whole_mode(whole.word[0][0])
+    model, mode = whole.model, whole.model.whole_mode(whole.itinerary[0][0])
     sections = {s for part, s in model.sections if model.whole_mode(part) == mode}
-    others = [pair for pair in whole.word if model.whole_mode(pair[0]) != mode]
-    if not sections or others or whole.system.holds or is_smooth(model, whole.word):
+    others = [pair for pair in whole.itinerary if model.whole_mode(pair[0]) != mode]
+    if not sections or others or whole.system.holds or is_smooth(model, whole.itinerary):
         return None
     surface = min(sections, key=model.surface_index.__getitem__)
     chosen = _by_turns(whole, surface, turns)
     if not chosen:
         return None
     pairs = {-side: pair for side, pair in model.section_pairs(mode, surface).items()}
-    word: list[tuple[str, str]] = []
+    itinerary: list[tuple[str, str]] = []
     joints: list[FloatArray] = []
-    for i, pair in enumerate(whole.word):
+    for i, pair in enumerate(whole.itinerary):
         cuts = sorted((c for c in chosen if c.segment == i), key=lambda c: c.time)
         joints += [whole.cycle[i], *(c.joint for c in cuts)]
-        word += [*(pairs[c.way] for c in cuts), pair]
-    system = build_system(model, tuple(word), whole.periods)
+        itinerary += [*(pairs[c.way] for c in cuts), pair]
+    system = build_system(model, tuple(itinerary), whole.periods)
     found = clocked(model, np.array(joints), float(joints[0][0]) + whole.period)
     return replace(whole, system=system, joints=found)
 
@@ -69,7 +69,7 @@ class _Crossing:
 
 def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
     """Return the fastest crossings of a surface, one each way in each turn."""
-    every = [c for i in range(len(whole.word)) for c in _inside(whole, i, surface)]
+    every = [c for i in range(len(whole.itinerary)) for c in _inside(whole, i, surface)]
     ways = {way: [c for c in every if c.way == way] for way in (-1, 1)}
     if not all(ways.values()):
         return []
@@ -92,10 +92,10 @@ def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
 
 def _inside(whole: Orbit, i: int, surface: str) -> list[_Crossing]:
     """Return the crossings of a surface inside of one segment."""
-    flow, mode = whole.flow, whole.word[i][0]
+    flow, mode = whole.flow, whole.itinerary[i][0]
     observable, level = whole.model.surface_by_name[surface].observable, flow.level(surface)
     place, end = whole.begins[i], float(whole.ends[i, 0])
-    found, on = [], whole.word[i - 1][1] == surface
+    found, on = [], whole.itinerary[i - 1][1] == surface
     for _ in range(_MOST):
         time = float(place[0])
         hit = flow.first(mode, observable, level, time, place[1:], end - time, on=on)

@@ -15,7 +15,7 @@ import numpy as np
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Word, build_system
+from contfric.orbit.system import Itinerary, build_system
 
 #: A crossing this slow compared with the fastest one is that of a small loop.
 _SMALL = 0.2
@@ -25,60 +25,68 @@ _SAME = 1e-8
 _MOST, _AT_JOINT = 1000, 1e-8
 
 
-def has_sections(model: Model, word: Word) -> bool:
-    """Tell whether a word has joints on sections and on other surfaces."""
-    return bool(model.sections) and any(pair in model.sections for pair in word)
+def has_sections(model: Model, itinerary: Itinerary) -> bool:
+    """Tell whether an itinerary has joints on sections and on other surfaces."""
+    return bool(model.sections) and any(pair in model.sections for pair in itinerary)
 
 
-def is_smooth(model: Model, word: Word) -> bool:
+def is_smooth(model: Model, itinerary: Itinerary) -> bool:
     """Tell whether a cycle meets nothing but sections."""
-    return bool(model.sections) and all(pair in model.sections for pair in word)
+    return bool(model.sections) and all(pair in model.sections for pair in itinerary)
 
 
-def named_by_ends(word: Word, model: Model) -> Word:
-    """Return a word with the names of parts of modes only where a segment ends on a section."""
+def named_by_ends(itinerary: Itinerary, model: Model) -> Itinerary:
+    """Return an itinerary with the names of parts of modes only where a segment ends on a section."""
     if not model.joined:
-        return word
+        return itinerary
     return tuple(
-        pair if pair in model.sections else (model.whole_mode(pair[0]), pair[1]) for pair in word
+        pair if pair in model.sections else (model.whole_mode(pair[0]), pair[1])
+        for pair in itinerary
     )
 
 
 def without_sections(
-    model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
-) -> tuple[Word, FloatArray, float]:
-    """Return a whole cycle without its joints on sections: word, joints and the time at which it ends.
+    model: Model,
+    itinerary: Itinerary,
+    joints: FloatArray,
+    end: float,
+    vector: FloatArray,
+    periods: int,
+) -> tuple[Itinerary, FloatArray, float]:
+    """Return a whole cycle without its joints on sections: itinerary, joints and the time at which it ends.
 
     Parameters
     ----------
-    word, joints : all segments of a cycle and the time and state where each begins, behind no reset
+    itinerary, joints : all segments of a cycle and the time and state where each begins, behind no reset
     end : time at which the cycle ends
     vector : parameters, which tell how fast a section is crossed
     periods : of the excitation; without one, how many crossings each way are kept
     """
     if not model.joined:
-        return word, joints, end
-    kept = [i for i, pair in enumerate(word) if pair not in model.sections]
+        return itinerary, joints, end
+    kept = [i for i, pair in enumerate(itinerary) if pair not in model.sections]
     if not kept:
-        kept = _fastest(model, word, joints, end, vector, periods)
-    first = kept[-1] + 1 - len(word)  # the first segment may begin in the cycle before
+        kept = _fastest(model, itinerary, joints, end, vector, periods)
+    first = kept[-1] + 1 - len(itinerary)  # the first segment may begin in the cycle before
     starts = [first, *(i + 1 for i in kept[:-1])]
-    found = joints[[i % len(word) for i in starts]].copy()
+    found = joints[[i % len(itinerary) for i in starts]].copy()
     period = end - joints[0, 0]
     if first < 0:
         found[0, 0] -= period
     pairs = tuple(
-        model.section_pair(*word[i])
-        if word[i] in model.sections
-        else (model.whole_mode(word[i][0]), word[i][1])
+        model.section_pair(*itinerary[i])
+        if itinerary[i] in model.sections
+        else (model.whole_mode(itinerary[i][0]), itinerary[i][1])
         for i in kept
     )
     return pairs, found, float(found[0, 0]) + period
 
 
-def loops(model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray) -> int:
+def loops(
+    model: Model, itinerary: Itinerary, joints: FloatArray, end: float, vector: FloatArray
+) -> int:
     """Return how often a smooth cycle crosses its section each way; small loops are left out."""
-    crossings = _Crossings(model, word, joints, end, vector)
+    crossings = _Crossings(model, itinerary, joints, end, vector)
     rates = [crossings.rates[i] for i in crossings.down]
     return max(1, sum(rate > _SMALL * max(rates) for rate in rates))
 
@@ -88,16 +96,16 @@ def canonical(orbit: Orbit) -> Orbit:
 
     Orbits of earlier versions have them.
     """
-    model, word = orbit.model, orbit.system.word
-    if not has_sections(model, word) or orbit.system.domains or is_smooth(model, word):
+    model, itinerary = orbit.model, orbit.system.itinerary
+    if not has_sections(model, itinerary) or orbit.system.domains or is_smooth(model, itinerary):
         return orbit
     if orbit.system.half:
         return canonical(orbit.as_whole())
     start = float(orbit.joints[0, 0])
     found, joints, end = without_sections(
-        model, word, orbit.joints, start + orbit.period, orbit.vector, orbit.periods
+        model, itinerary, orbit.joints, start + orbit.period, orbit.vector, orbit.periods
     )
-    if found == word:
+    if found == itinerary:
         return orbit
     system = build_system(model, found, orbit.periods)
     return replace(orbit, system=system, joints=clocked(model, joints, end))
@@ -109,20 +117,20 @@ def moved(orbit: Orbit) -> Orbit | None:
     For an orbit of which a joint is about to vanish, where the orbit only touches the section.
     """
     model, whole = orbit.model, orbit.as_whole()
-    if not is_smooth(model, whole.word):
+    if not is_smooth(model, whole.itinerary):
         return None
-    pairs = len(whole.word) // 2
-    other = _with_pairs(whole, pairs) if len(whole.word) == 2 * pairs else None
+    pairs = len(whole.itinerary) // 2
+    other = _with_pairs(whole, pairs) if len(whole.itinerary) == 2 * pairs else None
     if other is None or not orbit.system.half:
         return other
-    n, found = len(orbit.system.word), other.joints
+    n, found = len(orbit.system.itinerary), other.joints
     return replace(orbit, joints=clocked(model, found[:n], float(found[n, 0])))
 
 
 def in_halves(orbit: Orbit) -> Orbit:
     """Return a smooth orbit of an even number of periods with joints in both halves, if it has them."""
-    pairs, odd = divmod(len(orbit.system.word), 2)
-    smooth = is_smooth(orbit.model, orbit.system.word) and not orbit.system.half
+    pairs, odd = divmod(len(orbit.system.itinerary), 2)
+    smooth = is_smooth(orbit.model, orbit.system.itinerary) and not orbit.system.half
     if not smooth or orbit.model.autonomous or odd or pairs % 2 == 0 or orbit.periods % 2:
         return orbit
     return _with_pairs(orbit, 2 * pairs) or orbit
@@ -131,15 +139,15 @@ def in_halves(orbit: Orbit) -> Orbit:
 def _with_pairs(whole: Orbit, pairs: int) -> Orbit | None:
     """Return a smooth orbit with some number of joints each way, in the rotation that it has."""
     model, period = whole.model, whole.period
-    word, joints = _every_crossing(whole)
-    crossings = _Crossings(model, word, joints, float(joints[0, 0]) + period, whole.vector)
+    itinerary, joints = _every_crossing(whole)
+    crossings = _Crossings(model, itinerary, joints, float(joints[0, 0]) + period, whole.vector)
     kept = crossings.chosen(pairs) if len(crossings.down) >= pairs else []
     if len(kept) != 2 * pairs:
         return None
-    starts = [(i + 1) % len(word) for i in kept]
-    ends = [model.section_pair(*word[i]) for i in kept]
+    starts = [(i + 1) % len(itinerary) for i in kept]
+    ends = [model.section_pair(*itinerary[i]) for i in kept]
     own = (*ends[1:], ends[0])  # the segment that begins at a joint ends at the next
-    turn = own.index(whole.word[0])
+    turn = own.index(whole.itinerary[0])
     found = joints[starts][np.arange(turn, turn + len(own)) % len(own)].copy()
     for k in range(1, len(found)):
         while found[k, 0] <= found[k - 1, 0]:
@@ -152,19 +160,21 @@ def _with_pairs(whole: Orbit, pairs: int) -> Orbit | None:
 def shortened(whole: Orbit, turns: int) -> Orbit | None:
     """Return the part that a smooth orbit repeats, as an orbit; None if it does not run through one."""
     model = whole.model
-    if model.autonomous or not is_smooth(model, whole.word):
+    if model.autonomous or not is_smooth(model, whole.itinerary):
         return None
     step = whole.period / turns
     for joint in whole.cycle:
         gap = np.abs(whole.state(float(joint[0]) + step) - joint[1:])
         if np.max(gap) > _SAME * (1.0 + np.max(np.abs(whole.joints))):
             return None
-    word, joints = _every_crossing(whole)
-    n, rest = divmod(len(word), turns)
+    itinerary, joints = _every_crossing(whole)
+    n, rest = divmod(len(itinerary), turns)
     if rest:
         return None
     periods, end = whole.periods // turns, float(joints[n, 0])
-    found, starts, _ = without_sections(model, word[:n], joints[:n], end, whole.vector, periods)
+    found, starts, _ = without_sections(
+        model, itinerary[:n], joints[:n], end, whole.vector, periods
+    )
     return replace(whole, system=build_system(model, found, periods), joints=starts)
 
 
@@ -182,10 +192,10 @@ def crossings_near(whole: Orbit, joints: FloatArray) -> FloatArray:
     return np.array(found)
 
 
-def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
-    """Return all crossings of its section as the word and the joints of a smooth orbit, in order."""
+def _every_crossing(whole: Orbit) -> tuple[Itinerary, FloatArray]:
+    """Return all crossings of its section as the itinerary and the joints of a smooth orbit, in order."""
     model, flow = whole.model, whole.flow
-    mode, surface = whole.word[0]
+    mode, surface = whole.itinerary[0]
     observable, level = model.surface_by_name[surface].observable, flow.level(surface)
     pairs = model.section_pairs(mode, surface)
     found: list[FloatArray] = []
@@ -201,24 +211,24 @@ def _every_crossing(whole: Orbit) -> tuple[Word, FloatArray]:
     joints = np.array(found)
     rates = [flow.rate(mode, observable, float(z[0]), z[1:]) for z in joints]
     # the segment that begins at a joint ends at the next one, on the side that this one leads to
-    word = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)
-    return word, joints
+    itinerary = tuple(pairs[1 if rate > 0.0 else -1] for rate in rates)
+    return itinerary, joints
 
 
 class _Crossings:
     """The crossings of the first section that a smooth cycle has, each as the segment that ends there."""
 
     def __init__(
-        self, model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray
+        self, model: Model, itinerary: Itinerary, joints: FloatArray, end: float, vector: FloatArray
     ) -> None:
         self.model = model
-        surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in word))
-        self.at = [i for i, pair in enumerate(word) if pair[1] == surface]
+        surface = next(s for s in model.surface_by_name if any(pair[1] == s for pair in itinerary))
+        self.at = [i for i, pair in enumerate(itinerary) if pair[1] == surface]
         self.ends = np.concatenate((joints[1:], joints[:1]))
         self.ends[-1, 0] = end
         self.period = end - float(joints[0, 0])
-        self.rates = {i: _rate(model, word[i], self.ends[i], vector) for i in self.at}
-        self.down = [i for i in self.at if model.section_sides[word[i]] > 0]
+        self.rates = {i: _rate(model, itinerary[i], self.ends[i], vector) for i in self.at}
+        self.down = [i for i in self.at if model.section_sides[itinerary[i]] > 0]
 
     def chosen(self, pairs: int) -> list[int]:
         """Return crossings in both directions by turns, as many each way as there are to be."""
@@ -269,10 +279,15 @@ class _Crossings:
 
 
 def _fastest(
-    model: Model, word: Word, joints: FloatArray, end: float, vector: FloatArray, periods: int
+    model: Model,
+    itinerary: Itinerary,
+    joints: FloatArray,
+    end: float,
+    vector: FloatArray,
+    periods: int,
 ) -> list[int]:
     """Return the segments at whose ends a smooth cycle keeps a joint."""
-    crossings = _Crossings(model, word, joints, end, vector)
+    crossings = _Crossings(model, itinerary, joints, end, vector)
     if not crossings.down:
         return crossings.at[:1]
     return crossings.chosen(min(periods, len(crossings.down)) if model.autonomous else 1)

@@ -5,7 +5,7 @@ Such a motion is not periodic, however near its returns are: its creep ``c`` a p
 go where the excess of its load, at most like e, lasts for a time like the root of e: it gets a velocity like
 ``e**(3/2)``, and ``c = k e**2``. For any ``c = k e**p`` with a small c/e the ratio r of two creeps is
 ``1 - p c/e``, so that ``q = c/(1 - r) = e/p``; and q falls by c/p from one creep to the next, which gives p
-(for p = 1 both hold for any r). What the motion comes to is an orbit of the word without these slides, at
+(for p = 1 both hold for any r). What the motion comes to is an orbit of the itinerary without these slides, at
 a position by e farther on: one of a continuum (:mod:`contfric.orbit.conserved`).
 """
 
@@ -27,8 +27,8 @@ _BEYOND = 1.01
 
 
 def creeps(trajectory: Trajectory, lag: int) -> bool:
-    """Tell whether the last events are those of a word in which something only grows."""
-    return bool(only_grows(trajectory.model, trajectory.word[-lag:]))
+    """Tell whether the last events are those of an itinerary in which something only grows."""
+    return bool(only_grows(trajectory.model, trajectory.itinerary[-lag:]))
 
 
 def beyond_creep(trajectory: Trajectory, lag: int) -> tuple[float, FloatArray] | None:
@@ -38,12 +38,12 @@ def beyond_creep(trajectory: Trajectory, lag: int) -> tuple[float, FloatArray] |
     ----------
     lag : events after which the motion nearly returns
     """
-    model, word = trajectory.model, trajectory.word[-lag:]
-    modes = only_grows(model, word)
+    model, itinerary = trajectory.model, trajectory.itinerary[-lag:]
+    modes = only_grows(model, itinerary)
     if len(trajectory) < 4 * lag + 1 or not modes:
         return None
-    joint = next(k for k in range(1, lag + 1) if word[-k][0] not in modes) + 1
-    still = conserved(model, tuple(pair for pair in word if pair[0] not in modes))
+    joint = next(k for k in range(1, lag + 1) if itinerary[-k][0] not in modes) + 1
+    still = conserved(model, tuple(pair for pair in itinerary if pair[0] not in modes))
     at = [trajectory.states[-1 - k * lag] for k in range(5)]
     steps = [still.T @ (still @ (at[k] - at[k + 1])) for k in range(4)]
     left = _left([float(np.linalg.norm(step)) for step in steps])

@@ -122,7 +122,7 @@ class Trajectory(Shown):
         return f"<Trajectory of {self.model.name}: {len(self)} events, ended by {self.end.name}>"
 
     @property
-    def word(self) -> tuple[tuple[str, str], ...]:
+    def itinerary(self) -> tuple[tuple[str, str], ...]:
         """The (mode, exit surface) pairs of the segments that ended."""
         modes = [m.name for m in self.model.modes]
         surfaces = [s.name for s in self.model.surfaces]
@@ -188,7 +188,7 @@ def simulate(
     Examples
     --------
     >>> import contfric as cf
-    >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).word[0]
+    >>> cf.simulate("coulomb", {"Omega": 0.5}, state=[1.3, 0.0], periods=2).itinerary[0]
     ('stick', 'F+')
     """
     model, params = tied(model, params)

@@ -1,6 +1,6 @@
-"""The slides of a motion: what it is, whatever word it is solved with.
+"""The slides of a motion: what it is, whatever itinerary it is solved with.
 
-A motion at an event solves several words. They differ by segments of no length, and by touches of rest
+A motion at an event solves several itineraries. They differ by segments of no length, and by touches of rest
 inside of a slide. The slides of some length, joined over such touches, are the same for all of them.
 """
 
@@ -25,9 +25,9 @@ def resting_modes(orbit: Orbit) -> set[str]:
     """Return the modes of an orbit in which nothing moves.
 
     One in which a contact rests is not enough: of several contacts, or masses, one nearly always does. And
-    it does not depend on the word, so that all words of one motion have the same slides.
+    it does not depend on the itinerary, so that all itineraries of one motion have the same slides.
     """
-    return {mode for mode, _ in orbit.word if orbit.model.is_at_rest(mode)}
+    return {mode for mode, _ in orbit.itinerary if orbit.model.is_at_rest(mode)}
 
 
 def slides_of(orbit: Orbit) -> list[int]:
@@ -39,18 +39,18 @@ def slides_of(orbit: Orbit) -> list[int]:
     """
     sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    some = [i for i in range(len(orbit.word)) if lasts[i] > SHORT]
-    cut = [i for i in some if orbit.word[i - 1] in orbit.model.sections]
-    if cut:  # the only joints that are in every word
+    some = [i for i in range(len(orbit.itinerary)) if lasts[i] > SHORT]
+    cut = [i for i in some if orbit.itinerary[i - 1] in orbit.model.sections]
+    if cut:  # the only joints that are in every itinerary
         return cut
     found = []
     for k, i in enumerate(some):
-        before, mode = some[k - 1], orbit.word[i][0]
+        before, mode = some[k - 1], orbit.itinerary[i][0]
         gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
-        goes_on = orbit.word[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
+        goes_on = orbit.itinerary[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
         if mode not in sliding and not goes_on:
             found.append(i)
-    return found or [i for i in some if orbit.word[i][0] not in sliding] or [0]
+    return found or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]
 
 
 def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
@@ -191,7 +191,7 @@ def _impacts(whole: Orbit) -> FloatArray:
     """Return time and state in front of each reset that changes the state: a grazing impact is none."""
     behind = np.roll(whole.begins[:, 1:], -1, axis=0)
     jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_MOTION
-    struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.word]
+    struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.itinerary]
     return np.array(whole.ends[jumps & np.array(struck)])
 
 

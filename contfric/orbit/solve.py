@@ -13,13 +13,13 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
 from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
+from contfric.orbit.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.starts import start_of
 from contfric.orbit.system import System, build_system
-from contfric.orbit.words import half_of
 from contfric.remember.journal import SLOW, remembered
-from contfric.signature import Signature, reduced_word
+from contfric.signature import Signature, reduced_itinerary
 
 #: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
 #: the tests (the rarest needs about 150), at about a tenth of a millisecond each.
@@ -34,7 +34,7 @@ CANDIDATES = 40
 
 
 @remembered(slow=SLOW)
-def polish(orbit: Orbit, damped: bool = True) -> Orbit:
+def refine(orbit: Orbit, damped: bool = True) -> Orbit:
     """Solve the boundary-value problem from an orbit's joints; the status says how it went.
 
     Parameters
@@ -68,7 +68,7 @@ def solve_orbit(
 ) -> Orbit:
     """Find an admissible orbit of a signature at given parameters, stable or not.
 
-    Short simulations from many starts are searched for stretches that walk the signature's word;
+    Short simulations from many starts are searched for stretches that walk the signature's itinerary;
     those that nearly close are handed to Newton.
 
     Parameters
@@ -99,12 +99,12 @@ def solve_orbit(
     vector = model.vector(params)
     seed = whole_number("seed", seed, least=0)
     function_of("progress", progress)
-    word = reduced_word(signature)
-    half = half_of(model, word, signature.periods) if signature.symmetric else None
+    itinerary = reduced_itinerary(signature)
+    half = half_of(model, itinerary, signature.periods) if signature.symmetric else None
     if half is not None:
         system = build_system(model, half, signature.periods, half=True)
     else:
-        system = build_system(model, word, signature.periods)
+        system = build_system(model, itinerary, signature.periods)
     nearest: Orbit | None = None
     for orbit in _solved_starts(system, vector, seed, progress or _nothing):
         if orbit.converged and orbit.admissible and _is_wanted(orbit, signature):
@@ -160,13 +160,13 @@ def _solved_starts(
             if any(np.max(np.abs(joints - other)) < 1e-3 for other in tried):
                 continue
             tried.append(joints)
-            yield polish(Orbit(system, joints, vector.copy(), np.inf, Status.NOT_CONVERGED))
+            yield refine(Orbit(system, joints, vector.copy(), np.inf, Status.NOT_CONVERGED))
 
 
 def _matching_stretches(
     system: System, vector: FloatArray, seed: int, say: Callable[[str], None]
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Yield (mismatch, joints) of simulated stretches that walk the word of one turn."""
+    """Yield (mismatch, joints) of simulated stretches that walk the itinerary of one turn."""
     model = system.model
     rng = np.random.default_rng(seed)
     spread = model.spread(model.mapping(vector))
@@ -193,13 +193,13 @@ def _matching_stretches(
 def stretches(
     trajectory: Trajectory, system: System, period: float
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Yield (mismatch, joints) for each place where a trajectory walks the system's word."""
-    word, count = trajectory.word, system.segments
+    """Yield (mismatch, joints) for each place where a trajectory walks the system's itinerary."""
+    itinerary, count = trajectory.itinerary, system.segments
     clock = trajectory.times + trajectory.cycles * period
     points = np.column_stack([clock, trajectory.states])
     closure, turn = system.layout.closure, system.layout.turn * period
-    for i in range(1, len(word) - count + 1):
-        if word[i : i + count] != system.word:
+    for i in range(1, len(itinerary) - count + 1):
+        if itinerary[i : i + count] != system.itinerary:
             continue
         joints = clocked(
             system.model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0]
@@ -214,8 +214,8 @@ def stretches(
 
 def settle(orbit: Orbit) -> Orbit:
     """Solve an orbit, on its half if it turns out symmetric."""
-    solved = polish(orbit)
+    solved = refine(orbit)
     if not solved.converged:
         return solved
     half = solved.as_half()
-    return solved if half is solved else polish(half)
+    return solved if half is solved else refine(half)

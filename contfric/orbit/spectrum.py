@@ -4,7 +4,7 @@ They are the eigenvalues of the linear map M of one turn on ``z_0 = (t_0, y_0)``
 0 for the direction off the section, and one more for each direction that a stick takes away; those
 are exactly zero. One or two others are the roots of a quadratic in closed form, more of them LAPACK's.
 
-What a word conserves is taken away in the same way (:mod:`contfric.orbit.conserved`).
+What an itinerary conserves is taken away in the same way (:mod:`contfric.orbit.conserved`).
 
 Of an autonomous model a shift in time is mapped to itself: M is block triangular with a 1 for dt_0, the
 trivial multiplier, and the map of the states in the section. Its first column is made zero, which takes

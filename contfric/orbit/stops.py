@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import Word
+from contfric.orbit.system import Itinerary
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -19,10 +19,10 @@ _MOST = 1000
 _AT_JOINT = 1e-8
 
 
-def stopping_segments(model: Model, word: Word) -> list[int]:
+def stopping_segments(model: Model, itinerary: Itinerary) -> list[int]:
     """Return the segments that end at a stop or at an impact, where the displacement may turn."""
     ends = {model.stop_surface, *model.reset_by_surface}
-    return [i for i, (_, exit_) in enumerate(word) if exit_ in ends]
+    return [i for i, (_, exit_) in enumerate(itinerary) if exit_ in ends]
 
 
 def stops_of(orbit: Orbit) -> FloatArray:
@@ -32,7 +32,7 @@ def stops_of(orbit: Orbit) -> FloatArray:
         return stationary_points(orbit)
     if not model.stops_at_joints:
         return displacements(orbit, model.stop_surface)
-    return orbit.ends[stopping_segments(model, orbit.word), 1]
+    return orbit.ends[stopping_segments(model, orbit.itinerary), 1]
 
 
 def displacements(orbit: Orbit, surface: str) -> FloatArray:
@@ -46,7 +46,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
     if surface in model.surface_by_name:
         observable, level = model.surface_by_name[surface].observable, flow.level(surface)
     found: list[tuple[float, float]] = []
-    for i, (mode, exit_) in enumerate(orbit.word):
+    for i, (mode, exit_) in enumerate(orbit.itinerary):
         if model.mode_by_name[mode].sliding and exit_ in model.surface_by_name:
             lies = {d.signs.get(surface) for d in model.domains_of(mode)}
             if lies == {0}:
@@ -87,7 +87,7 @@ def stationary_points(orbit: Orbit) -> FloatArray:
     model = orbit.model
     x: list[float] = []
     struck: list[bool] = []
-    for i, (mode, exit_) in enumerate(orbit.word):
+    for i, (mode, exit_) in enumerate(orbit.itinerary):
         start, end = orbit.begins[i], orbit.ends[i]
         values = np.empty(0)
         if model.displacement and end[0] > start[0]:

@@ -47,11 +47,11 @@ from contfric.signature.holds import is_hold
 
 __all__ = [
     "IntArray",
+    "Itinerary",
     "Layout",
     "Margin",
     "System",
     "Test",
-    "Word",
     "build_system",
     "exit_domains",
     "inside_sign",
@@ -85,8 +85,8 @@ class Layout(NamedTuple):
     held : all holds, which could be left at any time, shape (k,)
     doubles : rows (margin, segment): the margin has a double zero where the segment has no length
     closure : state matrix of the closure, shape (n, n)
-    closing : the same for corrections, which leave alone what the word conserves, shape (n, n)
-    conserved : directions of the linear functions of the state that the word conserves, shape (k, n)
+    closing : the same for corrections, which leave alone what the itinerary conserves, shape (n, n)
+    conserved : directions of the linear functions of the state that the itinerary conserves, shape (k, n)
     turn : duration of one turn in periods of the excitation; 0 of an autonomous model
     rank : number of independent directions that survive one turn
     rounding : relative rounding of the flow
@@ -114,20 +114,20 @@ class Layout(NamedTuple):
     rounding: float
 
 
-Word = tuple[tuple[str, str], ...]
+Itinerary = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class System:
-    """A boundary-value problem: a reduced word with its closure, over one turn.
+    """A boundary-value problem: a reduced itinerary with its closure, over one turn.
 
     ``half`` says that the turn is half of the orbit and closes by the model's symmetry; ``domains``
     are those of the segments if the problem is in full form, empty if it is reduced; ``holds`` are those
-    of the word.
+    of the itinerary.
     """
 
     model: Model
-    word: Word
+    itinerary: Itinerary
     periods: int
     half: bool
     layout: Layout
@@ -138,7 +138,7 @@ class System:
     @property
     def segments(self) -> int:
         """Number of segments of one turn."""
-        return len(self.word)
+        return len(self.itinerary)
 
     def functions(self) -> int:
         """Return the model's compiled functions as kernels take them."""
@@ -147,42 +147,48 @@ class System:
 
 @cache
 def build_system(
-    model: Model, word: Word, periods: int, half: bool = False, domains: tuple[str, ...] = ()
+    model: Model,
+    itinerary: Itinerary,
+    periods: int,
+    half: bool = False,
+    domains: tuple[str, ...] = (),
 ) -> System:
-    """Assemble the boundary-value problem of a word.
+    """Assemble the boundary-value problem of an itinerary.
 
     Parameters
     ----------
-    word : tuple of (mode, exit surface)
+    itinerary : tuple of (mode, exit surface)
         One turn: the whole cycle, or its first half if ``half``.
     periods : int
         Excitation periods of the whole orbit.
     domains : tuple of str
-        Domains of the segments if the word is in full seven-domain form; by default the word is
+        Domains of the segments if the itinerary is in full seven-domain form; by default the itinerary is
         reduced and each segment spans its whole mode.
     """
-    following = following_modes(model, word, half)
+    following = following_modes(model, itinerary, half)
     surfaces = [s.name for s in model.surfaces]
-    holds = holds_of(model, word)
+    holds = holds_of(model, itinerary)
     inside = [
         _segment_domains(model, mode, exit_, _leads_to(i, after, holds), domains[i : i + 1])
-        for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
+        for i, ((mode, exit_), after) in enumerate(zip(itinerary, following, strict=True))
     ]
-    entered = [first_entry(model, word, half), *(exit_ for _, exit_ in word[:-1])]
-    entries = entry_rows(model, word, entered, domains)
+    entered = [first_entry(model, itinerary, half), *(exit_ for _, exit_ in itinerary[:-1])]
+    entries = entry_rows(model, itinerary, entered, domains)
     ending = [
         ending_sides(model, mode, exit_, _leads_to(i, after, holds), inside[i])
-        for i, ((mode, exit_), after) in enumerate(zip(word, following, strict=True))
+        for i, ((mode, exit_), after) in enumerate(zip(itinerary, following, strict=True))
     ]
-    interior, joint, tests = _margins(model, word, inside, ending, bool(domains), holds, entries)
-    exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(word)]
+    interior, joint, tests = _margins(
+        model, itinerary, inside, ending, bool(domains), holds, entries
+    )
+    exits = [_exit_surface(i, exit_, holds) for i, (_, exit_) in enumerate(itinerary)]
     held = {hold.segment: hold for hold in holds}
     symmetry = model.symmetry
     closure = symmetry.array() if half and symmetry else np.eye(len(model.states))
-    still = conserved(model, word)
+    still = conserved(model, itinerary)
     datum = kept_by(closure, still)
     layout = Layout(
-        modes=np.array([model.mode_index[mode] for mode, _ in word], dtype=np.int64),
+        modes=np.array([model.mode_index[mode] for mode, _ in itinerary], dtype=np.int64),
         exits=np.array([model.surface_index[exit_] for exit_ in exits], dtype=np.int64),
         observables=_surface_observables(model),
         exit_signs=np.array(
@@ -190,13 +196,17 @@ def build_system(
         ),
         interior=interior,
         joint=joint,
-        labels=_label_rows(model, word, half, bool(domains), holds),
-        pins=np.array([_pin(held.get(i), surfaces) for i in range(len(word))], dtype=np.int64),
-        **beginnings(model, word, exits, entered, half, held),
-        lasting=np.array([i for i, _ in lasting_segments(word, holds)], dtype=np.int64),
+        labels=_label_rows(model, itinerary, half, bool(domains), holds),
+        pins=np.array([_pin(held.get(i), surfaces) for i in range(len(itinerary))], dtype=np.int64),
+        **beginnings(model, itinerary, exits, entered, half, held),
+        lasting=np.array([i for i, _ in lasting_segments(itinerary, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         doubles=_rows(
-            [(tests.index(t), i) for t, i in double_zeros(model, word, half, holds) if t in tests],
+            [
+                (tests.index(t), i)
+                for t, i in double_zeros(model, itinerary, half, holds)
+                if t in tests
+            ],
             2,
         ),
         closure=closure,
@@ -204,15 +214,15 @@ def build_system(
         conserved=still,
         turn=_turn(model, periods, half),
         # a shift in time is no disturbance of an autonomous orbit
-        rank=min(model.mode_by_name[mode].rank for mode, _ in word)
+        rank=min(model.mode_by_name[mode].rank for mode, _ in itinerary)
         - int(model.autonomous)
         - len(still),
         rounding=model.rounding,
     )
-    return System(model, word, periods, half, layout, tests, domains, holds)
+    return System(model, itinerary, periods, half, layout, tests, domains, holds)
 
 
-made_of(System, lambda s: (s.model, s.word, s.periods, s.half, s.domains), build_system)
+made_of(System, lambda s: (s.model, s.itinerary, s.periods, s.half, s.domains), build_system)
 
 
 def _turn(model: Model, periods: int, half: bool) -> float:
@@ -221,10 +231,10 @@ def _turn(model: Model, periods: int, half: bool) -> float:
     return float(periods * (model.symmetry.fraction if half and model.symmetry else 1.0))
 
 
-def following_modes(model: Model, word: Word, half: bool) -> list[str]:
+def following_modes(model: Model, itinerary: Itinerary, half: bool) -> list[str]:
     """Return the mode behind each segment of a turn; behind half an orbit it is the image of the first."""
-    first = mirror_mode(model)[word[0][0]] if half else word[0][0]
-    return [*(mode for mode, _ in word[1:]), first]
+    first = mirror_mode(model)[itinerary[0][0]] if half else itinerary[0][0]
+    return [*(mode for mode, _ in itinerary[1:]), first]
 
 
 def _segment_domains(
@@ -281,7 +291,7 @@ def _surface_observables(model: Model) -> IntArray:
 
 def _margins(
     model: Model,
-    word: Word,
+    itinerary: Itinerary,
     inside: list[tuple[str, ...]],
     ending: list[dict[str, int]],
     full: bool,
@@ -291,7 +301,7 @@ def _margins(
     names = [s.name for s in model.surfaces]
     interior: list[tuple[int, ...]] = []
     joint: list[tuple[int, ...]] = []
-    for i, (mode, exit_) in enumerate(word):
+    for i, (mode, exit_) in enumerate(itinerary):
         own = model.chatter_by_mode.get(mode)
         if own is not None and not own.other:  # its flights stay on their side of the wall
             side = inside_sign(model, own.flight, own.surface)
@@ -314,11 +324,11 @@ def _margins(
         *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(
             Test(Margin.EXIT, i, _exit_surface(i, exit_, holds))
-            for i, (_, exit_) in enumerate(word)
+            for i, (_, exit_) in enumerate(itinerary)
         ),
         *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
         *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
-        *(Test(Margin.LASTING, i, surface) for i, surface in lasting_segments(word, holds)),
+        *(Test(Margin.LASTING, i, surface) for i, surface in lasting_segments(itinerary, holds)),
         *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows([*joint, *entries], 4), tests
@@ -329,16 +339,16 @@ def _rows(rows: list[tuple[int, ...]], width: int = 3) -> IntArray:
 
 
 def _label_rows(
-    model: Model, word: Word, half: bool, full: bool, holds: tuple[Hold, ...]
+    model: Model, itinerary: Itinerary, half: bool, full: bool, holds: tuple[Hold, ...]
 ) -> IntArray:
     """Segments and observables whose surfaces are transparent there, and where they start and end."""
     if full or model.composed:  # what bounds no mode has no side there
         return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
-    first = first_entry(model, word, half)
+    first = first_entry(model, itinerary, half)
     rows: list[tuple[int, ...]] = []
-    for i, (mode, exit_) in enumerate(word):
-        entry = word[i - 1][1] if i else first
+    for i, (mode, exit_) in enumerate(itinerary):
+        entry = itinerary[i - 1][1] if i else first
         for c, observable in enumerate(model.observables):
             clear = [
                 s.name

@@ -201,8 +201,8 @@ def draw_stops(ax: Axes, orbit: Orbit, across: str, up: str) -> None:
 def _stops(orbit: Orbit) -> Iterator[tuple[bool, FloatArray]]:
     """Yield whether a stick follows each stop, and its time and state, shape (1 + n,)."""
     model = orbit.model
-    following = [mode for mode, _ in [*orbit.word[1:], orbit.word[0]]]
-    for (_, exit_), end, after in zip(orbit.word, orbit.ends, following, strict=True):
+    following = [mode for mode, _ in [*orbit.itinerary[1:], orbit.itinerary[0]]]
+    for (_, exit_), end, after in zip(orbit.itinerary, orbit.ends, following, strict=True):
         if exit_ == model.stop_surface:
             yield model.mode_by_name[after].sliding, end
 

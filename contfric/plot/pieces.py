@@ -55,7 +55,7 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[Piece]:
     """Cut one period of an orbit at its joints and where it crosses a surface in between."""
     found: list[Piece] = []
     for i, ((mode, exit_), joint, start, end) in enumerate(
-        zip(orbit.word, orbit.cycle, orbit.begins, orbit.ends, strict=True)
+        zip(orbit.itinerary, orbit.cycle, orbit.begins, orbit.ends, strict=True)
     ):
         struck = not np.array_equal(joint, start)
         count = max(9, int(np.ceil(points * (end[0] - start[0]) / orbit.period)))

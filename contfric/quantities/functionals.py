@@ -91,8 +91,8 @@ class Measuring:
         laws = self.inside.powers(contact)
         size = max(least_size(self.motion.pieces, function) for function in laws)
         total = self._integral(asked, self.inside.power(contact), size)
-        loss, word = self.inside.loss(contact), self.motion.orbit.word
-        for segment, (_, exit_) in zip(self.motion.segments, word, strict=True):
+        loss, itinerary = self.inside.loss(contact), self.motion.orbit.itinerary
+        for segment, (_, exit_) in zip(self.motion.segments, itinerary, strict=True):
             if exit_ == contact and exit_ in self.motion.orbit.model.reset_by_surface:
                 lost = loss(segment, np.ones(1), Kinks())
                 slopes = lost.slopes[0, : self.motion.count]

@@ -294,7 +294,7 @@ class Motion:
         ends = np.roll(moved[:, 0], -1, axis=0)
         ends[-1] += self.d_period
         found = []
-        for i, (mode, _) in enumerate(orbit.word):
+        for i, (mode, _) in enumerate(orbit.itinerary):
             found.append(
                 Segment(
                     model=orbit.model,
@@ -315,7 +315,7 @@ class Motion:
     def _d_begin(self, i: int) -> FloatArray:
         """Return how the start of a segment moves: that of its joint, mapped by the reset there."""
         orbit, moved = self.orbit, self.d_cycle[i]
-        entry = orbit.word[i - 1][1]
+        entry = orbit.itinerary[i - 1][1]
         if entry not in orbit.model.reset_by_surface or not self.count:
             return np.asarray(moved[1:])
         n, every = len(moved) - 1, np.arange(len(orbit.vector))

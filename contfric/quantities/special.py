@@ -43,7 +43,7 @@ def impact_velocity(measuring: Measuring) -> Dual:
     """
     orbit, resets = measuring.motion.orbit, measuring.motion.orbit.model.reset_by_surface
     met: list[tuple[int, float, FloatArray]] = []
-    for i, (_, exit_) in enumerate(orbit.word):
+    for i, (_, exit_) in enumerate(orbit.itinerary):
         if exit_ in resets and resets[exit_].stays and not resets[exit_].wraps:
             rate, grad = _rate_at_end(orbit, i)
             met.append((i, abs(rate), np.sign(rate) * grad))
@@ -58,7 +58,7 @@ def impact_velocity(measuring: Measuring) -> Dual:
 
 def _rate_at_end(orbit: Orbit, i: int) -> tuple[float, FloatArray]:
     """Return the rate of the exit's observable at the end of a segment, and its gradient on (t, y, p)."""
-    model, (mode, exit_), joint = orbit.model, orbit.word[i], orbit.ends[i]
+    model, (mode, exit_), joint = orbit.model, orbit.itinerary[i], orbit.ends[i]
     m, c = model.mode_index[mode], model.observable_index[model.surface_by_name[exit_].observable]
     every = np.arange(len(orbit.vector))
     grad = np.empty(len(joint) + len(every))

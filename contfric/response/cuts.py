@@ -88,14 +88,14 @@ class Ends(NamedTuple):
     outcomes : number of the :class:`~contfric.response.outcome.Outcome`, shape (k,)
     turns : periods after which the solution repeats itself, 0 if it does not, shape (k,)
     upto : points found with it and all before, shape (k,)
-    words : a number for the sequence of its segments, shape (k,)
+    itineraries : a number for the sequence of its segments, shape (k,)
     states : state at the end, shape (k, n)
     """
 
     outcomes: IntArray
     turns: IntArray
     upto: IntArray
-    words: IntArray
+    itineraries: IntArray
     states: FloatArray
 
     def behind(self, done: int) -> Ends:
@@ -104,7 +104,7 @@ class Ends(NamedTuple):
             self.outcomes[done:],
             self.turns[done:],
             self.upto[done:],
-            self.words[done:],
+            self.itineraries[done:],
             self.states[done:],
         )
 
@@ -122,8 +122,8 @@ def empty_points(count: int, n: int) -> Points:
 
 def empty_ends(count: int, n: int) -> Ends:
     """Return empty rows for the ends of solutions."""
-    outcomes, turns, upto, words = np.zeros((4, count), dtype=np.int64)
-    return Ends(outcomes, turns, upto, words, np.zeros((count, n)))
+    outcomes, turns, upto, itineraries = np.zeros((4, count), dtype=np.int64)
+    return Ends(outcomes, turns, upto, itineraries, np.zeros((count, n)))
 
 
 def empty_batch(n: int) -> EventRows:

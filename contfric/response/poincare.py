@@ -162,7 +162,7 @@ def release_map(
     returns, images = np.full(k, np.nan), np.full(k, np.nan)
     returns[found] = points.times + points.cycles * period - times[found]
     images[found] = np.mod(points.times + _shifts(model, vector, release, period, points), period)
-    branch = _branches(ends.words, times, images, 1.5 * period / count, period)
+    branch = _branches(ends.itineraries, times, images, 1.5 * period / count, period)
     names = model.modes[release.mode].name, model.surfaces[release.surface].name
     return ReleaseMap(model, vector, *names, period, times, images, returns, branch, states)
 
@@ -259,18 +259,18 @@ def _shifts(
 
 
 def _branches(
-    words: IntArray, phases: FloatArray, images: FloatArray, step: float, period: float
+    itineraries: IntArray, phases: FloatArray, images: FloatArray, step: float, period: float
 ) -> IntArray:
-    """Return the number of the branch of each release: it ends where the word, or the grid, does."""
-    branch = np.full(len(words), -1, dtype=np.int64)
+    """Return the number of the branch of each release: it ends where the itinerary, or the grid, does."""
+    branch = np.full(len(itineraries), -1, dtype=np.int64)
     number = -1
-    for k in range(len(words)):
+    for k in range(len(itineraries)):
         if not np.isfinite(images[k]):
             continue
         joined = (
             k > 0
             and branch[k - 1] >= 0
-            and words[k] == words[k - 1]
+            and itineraries[k] == itineraries[k - 1]
             and phases[k] - phases[k - 1] <= step
             and abs(images[k] - images[k - 1]) <= 0.5 * period
         )

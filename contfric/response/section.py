@@ -174,7 +174,14 @@ def cut_solution(  # type: ignore[no-untyped-def]
     """Follow one solution from ``ws.segment`` and collect its points; return what it came to."""
     segment, timeless = ws.segment, period <= 0.0
     unit = 1.0 if timeless else period
-    surfaces, event, closing, turns, word, lasted = tables.observables.shape[0], 0, 0, 0, 0, 0.0
+    surfaces, event, closing, turns, itinerary, lasted = (
+        tables.observables.shape[0],
+        0,
+        0,
+        0,
+        0,
+        0.0,
+    )
     first, collecting = points.number[0], how.transient <= 0.0
     forget(ws.memory)
     set_strobe(cut, period, segment, ws.strobe)
@@ -198,9 +205,9 @@ def cut_solution(  # type: ignore[no-untyped-def]
             following = rows.joints[e + 1, 0] if e + 1 < count else mode
             step_behind(functions, tables, before, surface, following, at, phase, y, p, ws)
             event += 1
-            word = (word + before * surfaces + surface + 1) * _FACTOR + _OFFSET
+            itinerary = (itinerary + before * surfaces + surface + 1) * _FACTOR + _OFFSET
             if points.number[0] - first >= how.most:
-                ends.words[row] = word
+                ends.itineraries[row] = itinerary
                 return APERIODIC
             if closing > 0:
                 closing, lasted = closing - 1, lasted + duration
@@ -285,7 +292,7 @@ def cut_solutions(  # type: ignore[no-untyped-def]
         if period > 0.0:
             t -= math.floor(t / period) * period
         segment.at[0], segment.at[1], segment.at[2], segment.time[0] = mode, on, 0, t
-        ends.turns[row], ends.words[row] = 0, 0
+        ends.turns[row], ends.itineraries[row] = 0, 0
         outcome = NO_MOTION
         if mode >= 0:
             outcome = cut_solution(

@@ -50,11 +50,13 @@ def targets_of(model: Model, orbits: Sequence[Orbit]) -> Targets:
     owners: list[int] = []
     rows = [np.empty((0, 1 + n))]
     for number, orbit in enumerate(orbits):
-        word, begins = orbit.word, orbit.begins.copy()
+        itinerary, begins = orbit.itinerary, orbit.begins.copy()
         period = orbit.period / orbit.periods
         begins[:, 0] = 0.0 if model.autonomous else np.mod(begins[:, 0], period)
-        for i, (mode, _) in enumerate(word):
-            keys.append(model.mode_index[mode] * len(surfaces) + surfaces.index(word[i - 1][1]))
+        for i, (mode, _) in enumerate(itinerary):
+            keys.append(
+                model.mode_index[mode] * len(surfaces) + surfaces.index(itinerary[i - 1][1])
+            )
             owners.append(number)
         rows.append(begins)
     z, key = np.concatenate(rows), np.array(keys, dtype=np.int64)

@@ -45,9 +45,9 @@ class ResultWriter(Writer):
         self._model, self._field_name = model, ""
 
     def _node(self, value: Any) -> Any:
-        if type(value) is System:  # those of one word are one
+        if type(value) is System:  # those of one itinerary are one
             self._node(value.model)
-            asked = value.word, value.periods, value.half, value.domains
+            asked = value.itinerary, value.periods, value.half, value.domains
             value = build_system(self._model, *asked)
         if not isinstance(value, _SHARED):
             self._places.pop(id(value), None)

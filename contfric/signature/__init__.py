@@ -15,14 +15,14 @@ from contfric.signature.library import signature_names, signature_path
 from contfric.signature.notation import Signature, parse_signature
 from contfric.signature.reduced import (
     NEVER,
+    ReducedItinerary,
     ReducedPair,
     ReducedSegment,
-    ReducedWord,
-    canonical_word,
+    canonical_itinerary,
+    mirror_itinerary,
     mirror_pair,
-    mirror_word,
     reduce_signature,
-    reduced_word,
+    reduced_itinerary,
 )
 
 if TYPE_CHECKING:
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 
 __all__ = [
     "NEVER",
+    "ReducedItinerary",
     "ReducedPair",
     "ReducedSegment",
-    "ReducedWord",
     "Signature",
     "SignatureFile",
     "SignatureLike",
-    "canonical_word",
+    "canonical_itinerary",
     "crossing",
     "double",
     "is_closed_walk",
     "load_signature",
+    "mirror_itinerary",
     "mirror_pair",
-    "mirror_word",
     "parse_signature",
     "reduce_signature",
-    "reduced_word",
+    "reduced_itinerary",
     "signature_names",
     "signature_path",
     "successors",

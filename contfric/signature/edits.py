@@ -1,17 +1,17 @@
-"""Edits of reduced words: operations on walks of the transition graph.
+"""Edits of reduced itineraries: operations on walks of the transition graph.
 
 Everything is derived from the transitions of the model: which modes slide, and where a surface
-leads from a domain. No edit returns a word that the graph cannot walk.
+leads from a domain. No edit returns an itinerary that the graph cannot walk.
 
-An :class:`Edit` is a local change of a word: segments dropped, given another exit, or inserted behind
+An :class:`Edit` is a local change of an itinerary: segments dropped, given another exit, or inserted behind
 one. Edits at several places are joined by ``|``. With it are made
 
 * **insert** and **drop**: a segment of length zero appears or vanishes,
 * **swap**: stick and reversal at a stop (:func:`swap_stops`),
 * **split**: a segment ends earlier, and others follow it,
 
-and of whole words **double** (:func:`double`), **mirror**
-(:func:`~contfric.signature.reduced.mirror_word`) and **concatenate** (:func:`concatenate`).
+and of whole itineraries **double** (:func:`double`), **mirror**
+(:func:`~contfric.signature.reduced.mirror_itinerary`) and **concatenate** (:func:`concatenate`).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
 from contfric.models.composed import ComposedModel
 from contfric.signature.holds import is_hold, without_holds
-from contfric.signature.reduced import NEVER, ReducedPair, ReducedWord, fuses
+from contfric.signature.reduced import NEVER, ReducedItinerary, ReducedPair, fuses
 
 
 @dataclass(frozen=True)
 class Edit:
-    """A local change of a word; segments are counted before the change.
+    """A local change of an itinerary; segments are counted before the change.
 
     Attributes
     ----------
@@ -71,8 +71,8 @@ def drop(*segments: int) -> Edit:
     Examples
     --------
     >>> from contfric.models import load_model
-    >>> word = (("slide+", "v"), ("stick", "F+"), ("slide-", "v"), ("stick", "F-"))
-    >>> apply_edit(word, drop(1), load_model("coulomb"))
+    >>> itinerary = (("slide+", "v"), ("stick", "F+"), ("slide-", "v"), ("stick", "F-"))
+    >>> apply_edit(itinerary, drop(1), load_model("coulomb"))
     (('slide+', 'v'), ('slide-', 'v'), ('stick', 'F-'))
     """
     return Edit(dropped=frozenset(segments))
@@ -88,32 +88,32 @@ def split(segment: int, exit_surface: str, *pairs: ReducedPair) -> Edit:
     return Edit(renamed={segment: exit_surface}, inserted={segment: pairs} if pairs else {})
 
 
-def apply_edit(word: Sequence[ReducedPair], edit: Edit, model: Model) -> ReducedWord:
-    """Return the word after an edit, in the same rotation.
+def apply_edit(itinerary: Sequence[ReducedPair], edit: Edit, model: Model) -> ReducedItinerary:
+    """Return the itinerary after an edit, in the same rotation.
 
     Raises
     ------
     NotationError
         If the graph has no such walk.
     """
-    edited = tuple(pair for _, pair in edited_pieces(word, edit))
+    edited = tuple(pair for _, pair in edited_pieces(itinerary, edit))
     if not is_closed_walk(edited, model):
         raise NotationError(
-            f"{show(word)} cannot become {show(edited)}: the transitions of model '{model.name}' "
+            f"{show(itinerary)} cannot become {show(edited)}: the transitions of model '{model.name}' "
             "do not allow it"
         )
     return edited
 
 
 def edited_pieces(
-    word: Sequence[ReducedPair], edit: Edit
+    itinerary: Sequence[ReducedPair], edit: Edit
 ) -> list[tuple[tuple[int, int], ReducedPair]]:
     """Return the segments after an edit, each with where it comes from.
 
     (segment, -1) for one that was there, (segment, k) for the k-th one put in behind a segment.
     """
     pieces: list[tuple[tuple[int, int], ReducedPair]] = []
-    for index, (mode, exit_) in enumerate(word):
+    for index, (mode, exit_) in enumerate(itinerary):
         if index not in edit.dropped:
             pieces.append(((index, -1), (mode, edit.renamed.get(index, exit_))))
         for k, pair in enumerate(edit.inserted.get(index, ())):
@@ -121,26 +121,26 @@ def edited_pieces(
     return pieces
 
 
-def concatenate(*words: Sequence[ReducedPair]) -> ReducedWord:
-    """Return words run through one after the other, each in the rotation given.
+def concatenate(*itineraries: Sequence[ReducedPair]) -> ReducedItinerary:
+    """Return itineraries run through one after the other, each in the rotation given.
 
     Examples
     --------
     >>> concatenate((("slide+", "v"),), (("stick", "F-"),))
     (('slide+', 'v'), ('stick', 'F-'))
     """
-    return tuple(pair for word in words for pair in word)
+    return tuple(pair for itinerary in itineraries for pair in itinerary)
 
 
 def swap_stop(
     segments: Sequence[ReducedPair], joint: int, exit_surface: str, model: Model
-) -> ReducedWord:
+) -> ReducedItinerary:
     """Swap stick and reversal at one stop: the edit of the event CS.
 
     Parameters
     ----------
     segments : sequence of (mode, exit)
-        The reduced word, in any rotation. The result keeps it; if the stick is the first segment
+        The reduced itinerary, in any rotation. The result keeps it; if the stick is the first segment
         and ``joint`` the last, the result starts at the second.
     joint : int
         Index of the slide that ends at the stop.
@@ -148,7 +148,7 @@ def swap_stop(
         The surface that the state meets at the stop: the inserted stick ends there, and a stick
         that ends elsewhere has no length zero and cannot be removed.
     model : Model
-        The model that the word is of.
+        The model that the itinerary is of.
 
     Raises
     ------
@@ -158,8 +158,8 @@ def swap_stop(
     Examples
     --------
     >>> from contfric.models import load_model
-    >>> word = (("slide+", "v"), ("slide-", "v"), ("stick", "F-"))
-    >>> swap_stop(word, 0, "F+", load_model("coulomb"))
+    >>> itinerary = (("slide+", "v"), ("slide-", "v"), ("stick", "F-"))
+    >>> swap_stop(itinerary, 0, "F+", load_model("coulomb"))
     (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
     """
     return swap_stops(segments, {joint: exit_surface}, model)
@@ -167,13 +167,13 @@ def swap_stop(
 
 def swap_stops(
     segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model
-) -> ReducedWord:
+) -> ReducedItinerary:
     """Swap stick and reversal at several stops at once; see :func:`swap_stop`.
 
     Parameters
     ----------
     events : mapping of int to str
-        The surface met, for each joint; the indices are those of the word before the edit.
+        The surface met, for each joint; the indices are those of the itinerary before the edit.
 
     Raises
     ------
@@ -185,32 +185,32 @@ def swap_stops(
 
 def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model) -> Edit:
     """Return the edit that swaps stick and reversal at stops; see :func:`swap_stops`."""
-    word = _checked(segments, model)
+    itinerary = _checked(segments, model)
     edit = Edit()
     for joint, surface in events.items():
-        following = _stop(word, joint, surface, model)
-        if model.lies_on(word[following][0], word[joint][1]):
-            edit |= drop(_removable(word, following, surface))
+        following = _stop(itinerary, joint, surface, model)
+        if model.lies_on(itinerary[following][0], itinerary[joint][1]):
+            edit |= drop(_removable(itinerary, following, surface))
         else:
-            edit |= insert(joint, _new_stick(word, joint, surface, model))
+            edit |= insert(joint, _new_stick(itinerary, joint, surface, model))
     return edit
 
 
-def double(word: Sequence[ReducedPair]) -> ReducedWord:
-    """Return the word taken twice: what a period doubling starts from.
+def double(itinerary: Sequence[ReducedPair]) -> ReducedItinerary:
+    """Return the itinerary taken twice: what a period doubling starts from.
 
     Examples
     --------
     >>> double((("slide+", "v"), ("stick", "F-")))
     (('slide+', 'v'), ('stick', 'F-'), ('slide+', 'v'), ('stick', 'F-'))
     """
-    if len(word) == 1 and word[0][1] == NEVER:
-        return tuple(word)
-    return (*word, *word)
+    if len(itinerary) == 1 and itinerary[0][1] == NEVER:
+        return tuple(itinerary)
+    return (*itinerary, *itinerary)
 
 
-def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
-    """Return whether some closed walk through the domains of the model has this word.
+def is_closed_walk(itinerary: Sequence[ReducedPair], model: Model) -> bool:
+    """Return whether some closed walk through the domains of the model has this itinerary.
 
     Inside of a segment the walk may cross any transparent surface within its mode.
 
@@ -220,37 +220,39 @@ def is_closed_walk(word: Sequence[ReducedPair], model: Model) -> bool:
     >>> is_closed_walk((("slide+", "v"), ("stick", "F+")), load_model("coulomb"))
     False
     """
-    return _is_closed_walk(tuple(word), model)
+    return _is_closed_walk(tuple(itinerary), model)
 
 
 @cache
-def _is_closed_walk(word: ReducedWord, model: Model) -> bool:
-    if any(is_hold(exit_) for _, exit_ in word):
+def _is_closed_walk(itinerary: ReducedItinerary, model: Model) -> bool:
+    if any(is_hold(exit_) for _, exit_ in itinerary):
         try:
-            word = without_holds(word, model)
+            itinerary = without_holds(itinerary, model)
         except NotationError:
             return False
-    modes = [mode for mode, _ in word]
-    if len(word) == 1 and word[0][1] == NEVER:
+    modes = [mode for mode, _ in itinerary]
+    if len(itinerary) == 1 and itinerary[0][1] == NEVER:
         return _has_cycle(modes[0], model)
-    surfaces = {surface for _, surface in word}
-    if not word or not all(mode in model.mode_by_name for mode in modes):
+    surfaces = {surface for _, surface in itinerary}
+    if not itinerary or not all(mode in model.mode_by_name for mode in modes):
         return False
     if not all(surface in model.surface_by_name for surface in surfaces):
         return False
     first = model.whole_mode(modes[0])
     for entry in (domain.name for domain in model.domains_of(first)):
         reached = {entry}
-        for index, (mode, surface) in enumerate(word):
-            reached = entered(reached, surface, model, mode, modes[(index + 1) % len(word)])
+        for index, (mode, surface) in enumerate(itinerary):
+            reached = entered(reached, surface, model, mode, modes[(index + 1) % len(itinerary)])
         if entry in reached:
             return True
     return False
 
 
-def show(word: Iterable[ReducedPair]) -> str:
-    """Return a word as text, such as ``slide+|v stick|F+``."""
-    return " ".join(mode if surface == NEVER else f"{mode}|{surface}" for mode, surface in word)
+def show(itinerary: Iterable[ReducedPair]) -> str:
+    """Return an itinerary as text, such as ``slide+|v stick|F+``."""
+    return " ".join(
+        mode if surface == NEVER else f"{mode}|{surface}" for mode, surface in itinerary
+    )
 
 
 def entered(
@@ -299,45 +301,47 @@ def _has_cycle(mode: str, model: Model) -> bool:
     return False
 
 
-def _checked(segments: Sequence[ReducedPair], model: Model) -> ReducedWord:
-    word = tuple((mode, surface) for mode, surface in segments)
-    if not is_closed_walk(word, model):
+def _checked(segments: Sequence[ReducedPair], model: Model) -> ReducedItinerary:
+    itinerary = tuple((mode, surface) for mode, surface in segments)
+    if not is_closed_walk(itinerary, model):
         raise NotationError(
-            f"the word '{show(word)}' is no closed walk of the transitions of model '{model.name}'"
+            f"the itinerary '{show(itinerary)}' is no closed walk of the transitions of model '{model.name}'"
         )
-    return word
+    return itinerary
 
 
-def _stop(word: ReducedWord, joint: int, surface: str, model: Model) -> int:
+def _stop(itinerary: ReducedItinerary, joint: int, surface: str, model: Model) -> int:
     """Return the index of the segment after the stop at a joint."""
-    if not 0 <= joint < len(word):
-        raise NotationError(f"no joint {joint}: the word '{show(word)}' has 0..{len(word) - 1}")
+    if not 0 <= joint < len(itinerary):
+        raise NotationError(
+            f"no joint {joint}: the itinerary '{show(itinerary)}' has 0..{len(itinerary) - 1}"
+        )
     if surface not in model.surface_by_name:
         hint = did_you_mean(surface, model.surface_by_name)
         raise NotationError(f"model '{model.name}' has no surface '{surface}'{hint}")
-    mode, exit_surface = word[joint]
+    mode, exit_surface = itinerary[joint]
     slides = model.lies_on(mode, exit_surface) or not model.rests_on(exit_surface)
     if slides or not model.surface_by_name[exit_surface].switching:
         raise NotationError(
-            f"segment {joint} of '{show(word)}' does not end at a stop: only a slide that ends "
+            f"segment {joint} of '{show(itinerary)}' does not end at a stop: only a slide that ends "
             "on a switching surface does"
         )
-    return (joint + 1) % len(word)
+    return (joint + 1) % len(itinerary)
 
 
-def _removable(word: ReducedWord, index: int, surface: str) -> int:
-    if word[index][1] != surface:
+def _removable(itinerary: ReducedItinerary, index: int, surface: str) -> int:
+    if itinerary[index][1] != surface:
         raise NotationError(
-            f"the stick {index} of '{show(word)}' ends at {word[index][1]}, not at {surface}: it "
+            f"the stick {index} of '{show(itinerary)}' ends at {itinerary[index][1]}, not at {surface}: it "
             "cannot vanish there"
         )
     return index
 
 
-def _new_stick(word: ReducedWord, joint: int, surface: str, model: Model) -> ReducedPair:
+def _new_stick(itinerary: ReducedItinerary, joint: int, surface: str, model: Model) -> ReducedPair:
     """Return the sliding segment that can be inserted after a joint."""
-    mode, stop = word[joint]
-    next_mode = word[(joint + 1) % len(word)][0]
+    mode, stop = itinerary[joint]
+    next_mode = itinerary[(joint + 1) % len(itinerary)][0]
     slides = [domain.name for domain in model.domains_of(mode)]
     behind = {
         model.domain_by_name[t].mode for d in slides for t in model.targets.get((d, stop), ())
@@ -348,5 +352,5 @@ def _new_stick(word: ReducedWord, joint: int, surface: str, model: Model) -> Red
             return stick, surface
     raise NotationError(
         f"no stick that ends at {surface} fits between '{mode}' and '{next_mode}' "
-        f"(joint {joint} of '{show(word)}', model '{model.name}')"
+        f"(joint {joint} of '{show(itinerary)}', model '{model.name}')"
     )

@@ -12,7 +12,7 @@ parameter. See ``docs/bridges.md``.
     follows a segment that ends tangentially: a slide that touches rest (GS), or a stick that touches its
     limit (AS).
 
-In a reduced word a hold is the pair (sliding mode, ``hold@...``).
+In a reduced itinerary a hold is the pair (sliding mode, ``hold@...``).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def hold_at(surface: str) -> str:
 
 
 def is_hold(name: str) -> bool:
-    """Return whether a name (of a segment, or of an exit in a word) is that of a hold."""
+    """Return whether a name (of a segment, or of an exit in an itinerary) is that of a hold."""
     return name.startswith(_HOLD)
 
 
@@ -200,10 +200,10 @@ def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
     return f"'{hold}' leads to {' or '.join(expected) or 'no domain'}, not to {after}"
 
 
-def without_holds(word: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]:
-    """Return the word with a stick in the place of each hold that leads the same way.
+def without_holds(itinerary: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]:
+    """Return the itinerary with a stick in the place of each hold that leads the same way.
 
-    It is a closed walk of the transition graph exactly if the word with its holds can be walked.
+    It is a closed walk of the transition graph exactly if the itinerary with its holds can be walked.
 
     Examples
     --------
@@ -213,8 +213,8 @@ def without_holds(word: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]:
     (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
     """
     found: list[Pair] = []
-    for index, pair in enumerate(word):
-        before = word[index - 1]
+    for index, pair in enumerate(itinerary):
+        before = itinerary[index - 1]
         if not is_hold(pair[1]):
             found.append(pair)
         elif not model.mode_by_name[before[0]].sliding:

@@ -7,7 +7,7 @@
     the same where the state behind it is somewhere else, off the surface: a firing, a tick of a clock.
 
 It takes no time and is not a segment. It is written because the domains before and after it do not tell: both
-may be the same, or joined by another surface as well. In a reduced word it is the exit of the segment
+may be the same, or joined by another surface as well. In a reduced itinerary it is the exit of the segment
 before it.
 """
 

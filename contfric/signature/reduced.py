@@ -1,8 +1,8 @@
-"""Reduced words: signatures without the surfaces across which the vector field is the same.
+"""Reduced itineraries: signatures without the surfaces across which the vector field is the same.
 
-Whether a slide crosses ``F+`` inside is a label and no part of the dynamics. In the reduced word
+Whether a slide crosses ``F+`` inside is a label and no part of the dynamics. In the reduced itinerary
 consecutive domains of one mode, joined by a transparent surface, are one segment; orbits before
-and after an event T have the same reduced word.
+and after an event T have the same reduced itinerary.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from contfric.signature.impacts import is_impact
 from contfric.signature.notation import Signature
 
 #: Stands for the surface at the end of a segment that is the whole orbit and has no end. None of
-#: those that it crosses inside will do: they are labels, and would make the word depend on them.
+#: those that it crosses inside will do: they are labels, and would make the itinerary depend on them.
 NEVER = ""
 
 #: (mode, surface at its end).
 ReducedPair: TypeAlias = tuple[str, str]
-ReducedWord: TypeAlias = tuple[ReducedPair, ...]
+ReducedItinerary: TypeAlias = tuple[ReducedPair, ...]
 
 
 @dataclass(frozen=True)
@@ -39,14 +39,14 @@ class ReducedSegment:
 
     @property
     def pair(self) -> ReducedPair:
-        """What the reduced word keeps of it."""
+        """What the reduced itinerary keeps of it."""
         return self.mode, self.exit
 
 
 def reduce_signature(signature: Signature) -> tuple[ReducedSegment, ...]:
     """Return the reduced segments, in an order that does not depend on the signature's rotation.
 
-    The first one makes :func:`reduced_word` least; where the word repeats itself, the domains
+    The first one makes :func:`reduced_itinerary` least; where the itinerary repeats itself, the domains
     decide. A walk that never changes its mode is a single segment, and its end is :data:`NEVER`.
 
     Examples
@@ -67,23 +67,23 @@ def reduce_signature(signature: Signature) -> tuple[ReducedSegment, ...]:
     return rotated(pieces, block * least_rotation(blocks))
 
 
-def reduced_word(signature: Signature) -> ReducedWord:
+def reduced_itinerary(signature: Signature) -> ReducedItinerary:
     """Return the (mode, exit) pairs of the reduced segments, in canonical rotation.
 
     Examples
     --------
     >>> from contfric.models import load_model
     >>> from contfric.signature.notation import parse_signature
-    >>> reduced_word(parse_signature("x0v+ -> stick -> x-v+", load_model("coulomb")))
+    >>> reduced_itinerary(parse_signature("x0v+ -> stick -> x-v+", load_model("coulomb")))
     (('slide+', 'v'), ('stick', 'F-'))
     """
     return tuple(segment.pair for segment in reduce_signature(signature))
 
 
-def canonical_word(word: ReducedWord, model: Model) -> ReducedWord:
-    """Return the least rotation of a word, by the order of modes and surfaces in the model."""
-    word = tuple(word)
-    return rotated(word, least_rotation([_key(pair, model) for pair in word]))
+def canonical_itinerary(itinerary: ReducedItinerary, model: Model) -> ReducedItinerary:
+    """Return the least rotation of an itinerary, by the order of modes and surfaces in the model."""
+    itinerary = tuple(itinerary)
+    return rotated(itinerary, least_rotation([_key(pair, model) for pair in itinerary]))
 
 
 @cache
@@ -112,16 +112,16 @@ def mirror_pair(pair: ReducedPair, model: Model) -> ReducedPair:
     raise NotationError(f"model '{model.name}' has no mode '{mode}' with surface '{surface}'")
 
 
-def mirror_word(word: ReducedWord, model: Model) -> ReducedWord:
-    """Return the mirror image of a word in canonical rotation, ready to be compared.
+def mirror_itinerary(itinerary: ReducedItinerary, model: Model) -> ReducedItinerary:
+    """Return the mirror image of an itinerary in canonical rotation, ready to be compared.
 
     Examples
     --------
     >>> from contfric.models import load_model
-    >>> mirror_word((("slide+", "v"), ("stick", "F-")), load_model("coulomb"))
+    >>> mirror_itinerary((("slide+", "v"), ("stick", "F-")), load_model("coulomb"))
     (('slide-', 'v'), ('stick', 'F+'))
     """
-    return canonical_word(tuple(mirror_pair(pair, model) for pair in word), model)
+    return canonical_itinerary(tuple(mirror_pair(pair, model) for pair in itinerary), model)
 
 
 def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:

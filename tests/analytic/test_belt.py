@@ -44,7 +44,7 @@ def test_cycle_in_closed_form(v: float) -> None:
     assert orbit.period == pytest.approx(period_of(v), rel=1e-14)
     assert orbit.x_max == pytest.approx(S + radius, abs=1e-14)
     assert orbit.x_min == pytest.approx(S - radius, abs=1e-14)
-    assert set(orbit.word) == {("slower", "belt"), ("stick", "F+")}
+    assert set(orbit.itinerary) == {("slower", "belt"), ("stick", "F+")}
     assert orbit.multipliers.tolist() == [0.0] and orbit.stable
 
 

@@ -19,8 +19,8 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.matching import identity, stops_distance
+from contfric.censuses.itineraries import canonical_pair
 from contfric.censuses.sections import exit_arcs
-from contfric.censuses.words import canonical_pair
 from contfric.models.definition import FloatArray
 from contfric.signature.reduced import mirror_pair
 
@@ -118,7 +118,7 @@ def listed(census: cf.Census, periods: int) -> list[tuple[int, float]]:
     for orbit in census:
         images = [orbit] if orbit.symmetric else [orbit, orbit.mirror()]
         for image in images:
-            at = [i for i, pair in enumerate(image.word) if pair == ("stick", "F+")]
+            at = [i for i, pair in enumerate(image.itinerary) if pair == ("stick", "F+")]
             for phase in image.ends[at, 0] * image.params["Omega"] / TURN:
                 for times in range(1, periods // orbit.periods + 1):
                     found.append((times * orbit.periods, float(phase % 1.0)))
@@ -198,8 +198,8 @@ def test_period_adding_between_2a_and_1a() -> None:
             mirrored = TWO_A + tuple(mirror_pair(pair, model) for pair in ONE_A) * (
                 orbit.periods - 1
             )
-            words = {canonical_pair(model, added), canonical_pair(model, mirrored)}
-            assert canonical_pair(model, orbit.word) in words
+            itineraries = {canonical_pair(model, added), canonical_pair(model, mirrored)}
+            assert canonical_pair(model, orbit.itinerary) in itineraries
             lengths.append(orbit.periods)
     assert lengths == [2, 3, 4, 5]
 

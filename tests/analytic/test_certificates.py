@@ -82,7 +82,7 @@ def test_enclosures_hold_the_orbit_of_60_digits(params: dict[str, float]) -> Non
         "params": orbit.params,
         "periods": orbit.periods,
         "half": orbit.system.half,
-        "segments": orbit.system.word,
+        "segments": orbit.system.itinerary,
     }
     with mp.workdps(60):
         truth = Truth(data)
@@ -114,7 +114,7 @@ def truth_at(event: Bifurcation, parameter: str, shift: str = "0") -> Truth:
             "params": event.params,
             "periods": orbit.periods,
             "half": orbit.system.half,
-            "segments": orbit.system.word,
+            "segments": orbit.system.itinerary,
         }
     )
     value = event.certify(parameter).value

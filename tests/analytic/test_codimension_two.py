@@ -90,7 +90,7 @@ RANGES = {"Omega": (0.4, 0.6), "S": (0.15, 0.45)}
 
 
 def smooth_points(s0: float) -> list[tuple[cf.Curve, cf.SpecialPoint]]:
-    """Points at which curves of events of period 1 go on in the same word."""
+    """Points at which curves of events of period 1 go on in the same itinerary."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.6 * s0, "S0": s0})
     found = []
     for event in cf.explore(orbit, "Omega", (0.4, 0.6), max_periods=1).bifurcations:
@@ -120,8 +120,8 @@ def test_a_curve_that_starts_at_a_point_has_it(s0: float) -> None:
         assert near.count(point.name) == 1, (point, near)
 
 
-def test_a_curve_passes_each_word_once_at_one_place() -> None:
-    """Where margins vanish all along a curve, words followed one another to the limit of their number."""
+def test_a_curve_passes_each_itinerary_once_at_one_place() -> None:
+    """Where margins vanish all along a curve, itineraries followed one another to the limit of their number."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.322, "S0": 0.4})
     diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
     curves = [

@@ -56,7 +56,7 @@ def test_five_storeys_against_an_integrator() -> None:
     orbit, parts = storeys()
     p, work, squares = orbit.params, np.zeros(3), np.zeros(3)
     impacts = 0.0
-    for i, (mode, exit_) in enumerate(orbit.word):
+    for i, (mode, exit_) in enumerate(orbit.itinerary):
         (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
         letters = mode.removesuffix("-")
 
@@ -74,7 +74,7 @@ def test_five_storeys_against_an_integrator() -> None:
         work += found.y[12:15, -1]
         squares += found.y[15:, -1]
         if exit_ == "roof":
-            before, behind = np.array(end), orbit.begins[(i + 1) % len(orbit.word)][1:]
+            before, behind = np.array(end), orbit.begins[(i + 1) % len(orbit.itinerary)][1:]
             assert behind[10] + p["M"] * behind[11] == pytest.approx(
                 before[10] + p["M"] * before[11], abs=1e-12
             )

@@ -80,7 +80,7 @@ def test_solutions_are_the_limit_of_steep_slopes(text: str) -> None:
     for _ in range(4):
         start = rng.uniform(-1.5, 1.5, 4)
         found = cf.simulate(model, {}, state=start, periods=12.0)
-        visited |= {mode for mode, _ in found.word}
+        visited |= {mode for mode, _ in found.itinerary}
         last = len(found) - 1
         errors = []
         for eps in (1e-4, 1e-5):
@@ -117,7 +117,7 @@ def test_a_cycle_of_blocks_whose_friction_falls() -> None:
     text = text.replace("R*sign(w - vb)", "R/(1 + 3*abs(w - vb))*sign(w - vb)")
     orbit = cf.find_orbit(typed(text), {"vb": 0.1}, state=[0.0, 0.1, 0.1, 0.1])
     assert orbit.converged and orbit.admissible
-    modes = [mode for mode, _ in orbit.word]
+    modes = [mode for mode, _ in orbit.itinerary]
     assert "slide_a_b" in modes and len(set(modes)) > 2
     p = orbit.params
 

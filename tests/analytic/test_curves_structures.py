@@ -312,7 +312,7 @@ def test_popp_doublings_pass_touches_of_rest_and_end_at_the_belt() -> None:
     assert end.params["omega"] == pytest.approx(solved[2], abs=1e-9)
 
 
-def test_popp_grazing_is_one_curve_in_two_words() -> None:
+def test_popp_grazing_is_one_curve_in_two_itineraries() -> None:
     """Of the orbit without a stick (a touch inside) and of that with one (a tangential stop)."""
     a, b = curve("popp", "GS", "0a, 4seg"), curve("popp", "GS", "1a, 5seg")
     for found in (a, b):
@@ -379,7 +379,7 @@ class Pieces:
     """
 
     def __init__(self, orbit: cf.Orbit) -> None:
-        self.signs = [1.0 if mode == "right" else -1.0 for mode, _ in orbit.word]
+        self.signs = [1.0 if mode == "right" else -1.0 for mode, _ in orbit.itinerary]
         self.durations = (orbit.ends[:, 0] - orbit.cycle[:, 0]).tolist()
         self.start = orbit.cycle[0, 2:].tolist()
 
@@ -489,8 +489,8 @@ def test_gradient_of_a_divided_exit_row() -> None:
     event = next(e for e in diagram("dead-band").bifurcations if e.kind is cf.Kind.SN)
     plane = {"alpha": (1.0, 60.0), "delta": (0.005, 0.2)}
     found = continue_bifurcation(event, tuple(plane), plane)
-    words = found.parts[0].system.word
-    fast = next(i for i, (mode, _) in enumerate(words) if mode.startswith("fast"))
+    itineraries = found.parts[0].system.itinerary
+    fast = next(i for i, (mode, _) in enumerate(itineraries) if mode.startswith("fast"))
     lasts = [float(orbit.ends[fast, 0] - orbit.cycle[fast, 0]) for orbit in found]
     short = [k for k, d in enumerate(lasts) if 0.02 < d < 0.09]
     assert len(short) > 5

@@ -20,7 +20,7 @@ import pytest
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 EPS = np.finfo(float).eps
 COULOMB = cf.load_model("coulomb")
@@ -80,13 +80,13 @@ def params(omega: float, S: float, S0: float | None = None) -> dict[str, float]:
 def at(orbit: cf.Orbit, **changes: float) -> cf.Orbit:
     """Solve again at other parameters, from the joints of an orbit."""
     vector = COULOMB.vector(orbit.params | changes)
-    return polish(replace(orbit, vector=vector), damped=True)
+    return refine(replace(orbit, vector=vector), damped=True)
 
 
 def compare(orbit: cf.Orbit, limit: float = 1e-12) -> None:
     exact = DenHartog(orbit.params["Omega"], orbit.params["S"])
     assert orbit.converged and orbit.system.half
-    assert orbit.word == (("slide+", "v"), ("slide-", "v")), orbit
+    assert orbit.itinerary == (("slide+", "v"), ("slide-", "v")), orbit
     assert orbit.admissible, orbit.violations()
     x_max = float(exact.x_max)
     assert abs(orbit.x_max - x_max) < limit * x_max, orbit
@@ -158,7 +158,7 @@ def test_onset_of_sticking(omega: float) -> None:
         for k, test in enumerate(orbit.system.tests)
         if (test.margin.value, test.segment, test.surface) == ("joint", 0, "F+")
     )
-    assert orbit.system.word == (("slide+", "v"),)
+    assert orbit.system.itinerary == (("slide+", "v"),)
 
     def margin(S: float) -> float:
         nonlocal orbit

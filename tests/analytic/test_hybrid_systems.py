@@ -40,7 +40,7 @@ def closes(orbit: cf.Orbit, fields: dict, within: float = 1e-8) -> None:
     """Each segment, along the equations of its mode by scipy, ends at the next joint."""
     assert orbit.converged and orbit.admissible
     whole = orbit.as_whole()
-    for i, (mode, _) in enumerate(whole.word):
+    for i, (mode, _) in enumerate(whole.itinerary):
         begin, end = whole.begins[i], whole.ends[i]
         found = solve_ivp(
             fields[mode], (begin[0], end[0]), begin[1:], method="DOP853", rtol=1e-12, atol=1e-13
@@ -134,7 +134,7 @@ def test_rocking_block() -> None:
         leaves = W * force * math.sin(W * t0) + p * math.sinh(tau) + q * math.cosh(tau)
         return [ends, r * leaves + rate]
 
-    right = next(i for i, (mode, _) in enumerate(orbit.as_whole().word) if mode == "right")
+    right = next(i for i, (mode, _) in enumerate(orbit.as_whole().itinerary) if mode == "right")
     begin = orbit.as_whole().begins[right]
     solved = fsolve(gap, [begin[0], begin[2]], xtol=1e-13)
     assert begin[2] == pytest.approx(solved[1], abs=1e-10)
@@ -245,7 +245,7 @@ def test_buck_converter_doubles(turns: int, low: float, high: float) -> None:
 
         branch = next(b for b in found.branches if b[0].signature.resets == turns)
         near = min(branch, key=lambda o: abs(o.params["E"] - E))
-        i = next(k for k, (_, exit_) in enumerate(near.word) if exit_ == "tick")
+        i = next(k for k, (_, exit_) in enumerate(near.itinerary) if exit_ == "tick")
         y = near.ends[i, 1:3].copy()
         for _ in range(8):
             y = y - np.linalg.solve(slopes(y) - np.eye(2), several(y) - y)
@@ -275,10 +275,12 @@ def test_a_pendulum_rotates_and_oscillates() -> None:
     closes(oscillates, fields(0.5))
     closes(turns, fields(1.5))
     assert oscillates.signature.resets == 0 < turns.signature.resets
-    for i, (_, exit_) in enumerate(turns.word):  # behind a joint at pi it goes on at -pi
+    for i, (_, exit_) in enumerate(turns.itinerary):  # behind a joint at pi it goes on at -pi
         if exit_ == "theta+":
             assert turns.ends[i, 1] == pytest.approx(math.pi, abs=1e-12)
-            assert turns.begins[(i + 1) % len(turns.word), 1] == pytest.approx(-math.pi, abs=1e-12)
+            assert turns.begins[(i + 1) % len(turns.itinerary), 1] == pytest.approx(
+                -math.pi, abs=1e-12
+            )
 
 
 # -------------------------------------------------------------------------------- derived sliding
@@ -342,7 +344,7 @@ def test_normal_force() -> None:
 
     orbit = cf.find_orbit("normal-force", p)
     closes(orbit, {"forward": field(1), "backward": field(-1), "slide": field(0)})
-    for i, (mode, _) in enumerate(orbit.word):
+    for i, (mode, _) in enumerate(orbit.itinerary):
         if mode != "slide":
             continue
         t, x, _ = orbit.ends[i]  # it is released where the load is the friction
@@ -367,7 +369,7 @@ def test_jenkins_element() -> None:
 
     fields = {m: field(m.startswith("slip")) for m in ("stick+", "stick-", "slip+", "slip-")}
     orbit = cf.find_orbit("jenkins")
-    assert {mode for mode, _ in orbit.as_whole().word} == {
+    assert {mode for mode, _ in orbit.as_whole().itinerary} == {
         "stick+",
         "slip+",
         "slip-",
@@ -465,9 +467,9 @@ def test_compass_gait() -> None:
     orbit = cf.find_orbit(model, state=[-0.2942, 0.1894, 0.2146, -1.0506])
     closes(orbit, {"early": rates, "scuff": rates, "late": rates})
     assert orbit.period == pytest.approx(0.734, abs=5e-4)
-    i = next(k for k, (_, exit_) in enumerate(orbit.word) if exit_ == "strike")
+    i = next(k for k, (_, exit_) in enumerate(orbit.itinerary) if exit_ == "strike")
     ns, s, wns, ws = orbit.ends[i, 1:]
-    after = orbit.begins[(i + 1) % len(orbit.word), 1:]
+    after = orbit.begins[(i + 1) % len(orbit.itinerary), 1:]
     assert after[:2] == pytest.approx([s, ns], abs=1e-14)
     # about the foot that strikes: at the end of the swing leg, seen from the one that stood
     struck = np.array(

@@ -79,7 +79,7 @@ def diagram() -> cf.Diagram:
 
 def test_orbit_of_one_impact_in_closed_form() -> None:
     found = orbit()
-    at = [i for i, (_, exit_) in enumerate(found.word) if exit_ == "wall"]
+    at = [i for i, (_, exit_) in enumerate(found.itinerary) if exit_ == "wall"]
     assert len(at) == 1
     speed = found.ends[at[0], 2]
     assert min(abs(speed - u) for u in closed_form(PARAMS["wall"], found.periods)) < 1e-12
@@ -164,7 +164,7 @@ def test_branch_points_are_orbits_of_the_simulation() -> None:
             impact, found.params, state=found.state(time), time=time, periods=found.periods
         )
         assert np.max(np.abs(walked.last[2] - found.state(time))) < 1e-9
-        assert len(walked) == len(found.word)
+        assert len(walked) == len(found.itinerary)
 
 
 def test_signature_names_the_impact() -> None:

@@ -31,16 +31,16 @@ class Map:
 
     def __init__(self, orbit: cf.Orbit, half: bool) -> None:
         whole = orbit.as_whole()
-        count = len(whole.word)
-        first = next(i for i in range(count) if whole.word[i - 1][0] == "stick")
-        self.side = SIDE[whole.word[first - 1][1]]
-        self.word = [whole.word[(first + i) % count] for i in range(count)]
+        count = len(whole.itinerary)
+        first = next(i for i in range(count) if whole.itinerary[i - 1][0] == "stick")
+        self.side = SIDE[whole.itinerary[first - 1][1]]
+        self.itinerary = [whole.itinerary[(first + i) % count] for i in range(count)]
         times = [whole.cycle[(first + i) % count, 0] for i in range(count)]
         times = [t if t >= times[0] else t + whole.period for t in times]
         if half:
-            self.word = self.word[: count // 2]
+            self.itinerary = self.itinerary[: count // 2]
         # a rough start
-        self.times = [mpf(f"{t:.6f}") for t in times[: len(self.word)]]
+        self.times = [mpf(f"{t:.6f}") for t in times[: len(self.itinerary)]]
         self.turns = mpf(orbit.periods) / (2 if half else 1)
         self.S0 = mpf(orbit.params["S0"])
 
@@ -48,7 +48,7 @@ class Map:
         """Residuals of one turn, and (s, t0, x0, t1, x1) of each slide."""
         x = mp.cos(omega * times[0]) + self.side * self.S0
         residuals, slides = [], []
-        for (mode, exit_), start, end in zip(self.word, times, times[1:], strict=False):
+        for (mode, exit_), start, end in zip(self.itinerary, times, times[1:], strict=False):
             if mode == "stick":
                 residuals.append(x - mp.cos(omega * end) - SIDE[exit_] * self.S0)
                 continue
@@ -266,7 +266,7 @@ def test_every_event_is_the_one_of_the_return_map(name: str) -> None:
     events = regular(name).bifurcations
     compared = 0
     for event in events:
-        if not any(mode == "stick" for mode, _ in event.orbit.word):
+        if not any(mode == "stick" for mode, _ in event.orbit.itinerary):
             continue  # Den Hartog's orbit: see below
         assert event.params[parameter] == pytest.approx(reference(event, parameter), rel=1e-12)
         compared += 1

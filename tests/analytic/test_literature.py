@@ -100,7 +100,7 @@ def test_dead_band_in_closed_form() -> None:
     fold = value("dead-band", "SN", 3.17)
     turn = lambda a, x: DeadBand.beyond(a, DeadBand.across(a, x))  # noqa: E731
     at = next(b for b in diagram("dead-band").bifurcations if b.kind.value == "SN").orbit
-    start = max(s[1] for s, (_, e) in zip(at.ends, at.word, strict=True) if e == "v+")
+    start = max(s[1] for s, (_, e) in zip(at.ends, at.itinerary, strict=True) if e == "v+")
     a, _ = mp.findroot(
         lambda a, x: [turn(a, x) - x, mp.diff(lambda u: turn(a, u), x) - 1], (fold, start)
     )
@@ -109,7 +109,7 @@ def test_dead_band_in_closed_form() -> None:
 
 def test_dead_band_chain_of_4_6_and_4_segments() -> None:
     branches = diagram("dead-band").branches
-    chain = [(2 * len(b.system.word), b[0].signature.stops) for b in branches]
+    chain = [(2 * len(b.system.itinerary), b[0].signature.stops) for b in branches]
     assert sorted(chain) == [(4, 0), (4, 2), (6, 2)]
     assert all(b.symmetric for b in branches) and not diagram("dead-band").loose_ends
 
@@ -161,7 +161,7 @@ def test_belt_by_another_integrator() -> None:
 def test_cycle_of_the_belt() -> None:
     """Its period at 0.2 by the slip of another integrator and a stick at the belt's speed; far ahead."""
     orbit = cf.find_orbit("belt", {"vb": 0.2})
-    (stick,) = [k for k, (mode, _) in enumerate(orbit.word) if mode == "stick"]
+    (stick,) = [k for k, (mode, _) in enumerate(orbit.itinerary) if mode == "stick"]
     lasts = orbit.ends[stick, 0] - orbit.begins[stick, 0]
     assert lasts == pytest.approx((1.0 - Belt.slip(0.2, 1.0, -1.0)) / 0.2, abs=1e-9)
     assert orbit.period == pytest.approx(12.00103129483, abs=1e-10)
@@ -299,7 +299,7 @@ def test_impact_with_friction_codimension_two_by_runs() -> None:
 def test_impact_with_friction_signature() -> None:
     branch = diagram("impact-friction").branches[0]
     assert str(branch[0].signature).split(" -> ")[:2] == ["stick", "impact@wall"]
-    assert [mode for mode, _ in branch[0].word] == ["stick", "slide+", "slide-"]
+    assert [mode for mode, _ in branch[0].itinerary] == ["stick", "slide+", "slide-"]
 
 
 def _half_turns(A: float, y: Any, count: int) -> np.ndarray:

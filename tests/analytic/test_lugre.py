@@ -17,7 +17,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.smooth import smooth_events
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 
 #: Integrated models from end to end: minutes of processor time, run by `make test-all`.
@@ -160,7 +160,7 @@ def test_simulation_settles_on_what_the_symmetry_breaking_says(model, orbit, off
     branch = cf.continue_orbit(orbit, "S", (0.374, 0.385), max_step=0.002)
     breaking = next(b for b in branch.bifurcations if b.kind is cf.Kind.BP)
     at = {**WHERE, "S": BREAKING + offset}
-    beside = polish(replace(breaking.orbit, vector=model.vector(at)))
+    beside = refine(replace(breaking.orbit, vector=model.vector(at)))
     assert beside.converged
     assert beside.stable == symmetric
     shift = np.array([1e-8, 0.0, 0.0])
@@ -184,7 +184,7 @@ TIP, DOUBLING = 0.490256250422, 0.490256687616
 def tip(model):
     other = cf.find_orbit(model, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     vector = model.vector({"Omega": NEAR_TIP, "S": 0.32, "S0": 0.4})
-    found = polish(replace(other, joints=np.array(TIP_JOINTS), vector=vector), damped=False)
+    found = refine(replace(other, joints=np.array(TIP_JOINTS), vector=vector), damped=False)
     assert found.converged and not other.symmetric
     assert 1e-6 < found.mirror_distance < 1e-4
     return found
@@ -253,7 +253,7 @@ def test_a_step_to_another_sheet_that_is_solved_everywhere_is_taken_back(model):
     ends, arc = [], 0.0
     for value, joints in SHEETS.items():
         vector = model.vector({**WHERE, "S": 0.32, "Omega": value})
-        orbit = polish(Orbit(system, np.array(joints), vector, np.inf), damped=False)
+        orbit = refine(Orbit(system, np.array(joints), vector, np.inf), damped=False)
         settings = settings_of(orbit, "Omega", (0.46, 0.56), None, True, 20_000, None)
         point = first_point(orbit, settings)
         ends.append(replace(point if point.slope < 0.0 else point.reversed(), arc=arc))
@@ -266,7 +266,7 @@ def test_a_step_to_another_sheet_that_is_solved_everywhere_is_taken_back(model):
 
 def at(orbit, **changed):
     vector = orbit.model.vector({**orbit.params, **changed})
-    return polish(replace(orbit, vector=vector), damped=False)
+    return refine(replace(orbit, vector=vector), damped=False)
 
 
 def test_symmetry_breaking_beside_a_touch_is_located_to_rounding(symmetric):

@@ -102,9 +102,9 @@ def test_sum_rule_without_sticks(seed: int) -> None:
     }
     found = cf.lyapunov_exponent("coulomb", params)
     orbit = cf.find_orbit("coulomb", params)
-    assert "stick" not in {mode for mode, _ in orbit.word}
+    assert "stick" not in {mode for mode, _ in orbit.itinerary}
     ratios = []
-    for (mode, _), (time, x, _) in zip(orbit.word, orbit.ends, strict=True):
+    for (mode, _), (time, x, _) in zip(orbit.itinerary, orbit.ends, strict=True):
         w, h = params["Omega"], params["h"]
         load = x - np.cos(w * time) - h * np.cos(3 * w * time)
         s = 1.0 if mode == "slide+" else -1.0

@@ -136,7 +136,7 @@ def test_areas_shrink_by_damping_and_by_restitution() -> None:
     found = cf.lyapunov_exponent("impact", {"e": 0.7, "c": 0.15})
     assert found.motion is Motion.PERIODIC and found.periods == 1
     orbit = cf.find_orbit("impact", {"e": 0.7, "c": 0.15})
-    impacts = [surface for _, surface in orbit.word].count("wall")
+    impacts = [surface for _, surface in orbit.itinerary].count("wall")
     assert impacts > 0
     expected = -0.15 + 2.0 * impacts * np.log(0.7) / orbit.period
     assert np.sum(found.exponents) == pytest.approx(expected, abs=1e-10)

@@ -33,7 +33,7 @@ ROUNDING = 1e-12
 def residual(orbit: cf.Orbit) -> float:
     """Return how far the segments of an orbit are from their ends, and these from their surfaces."""
     worst, flow = 0.0, orbit.flow
-    for i, (mode, surface) in enumerate(orbit.word):
+    for i, (mode, surface) in enumerate(orbit.itinerary):
         (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
         found = flow.state(mode, t0, np.array(start), t1 - t0)
         worst = max(worst, float(np.max(np.abs(found - end) / (1.0 + np.abs(end)))))
@@ -55,7 +55,7 @@ def exponential(orbit: cf.Orbit, i: int) -> np.ndarray:
     With ``y' = A y + c + a cos(w t) + b sin(w t)`` the vector (y, 1, cos, sin) has linear rates.
     """
     fields, n = floats(from_text(orbit.model.definition)), len(orbit.model.states)
-    mode, _ = orbit.word[i]
+    mode, _ = orbit.itinerary[i]
     period = orbit.flow.period
 
     def rates(t: float, y: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 The reference solves the chain of segments of an orbit anew with mpmath: its own flow (constant coefficients
 and a cosine), its own equations, Newton with differences at 40 digits, quadrature by mpmath, and
-derivatives by central differences with a step of 1e-12. It shares the word of the orbit and a starting
+derivatives by central differences with a step of 1e-12. It shares the itinerary of the orbit and a starting
 point with the library, and nothing else.
 """
 
@@ -31,7 +31,7 @@ class Chain:
 
     def __init__(self, orbit: cf.Orbit) -> None:
         whole = orbit.as_whole()
-        self.word, self.periods = whole.word, whole.periods
+        self.itinerary, self.periods = whole.itinerary, whole.periods
         self.start = [mpf(float(value)) for value in whole.joints.ravel()]
 
     def slide(self, p: dict[str, Any], s: int, t0: Any, x0: Any, v0: Any) -> Callable[[Any], Any]:
@@ -63,8 +63,8 @@ class Chain:
 
     def pieces(self, p: dict[str, Any], z: list[Any]) -> list[tuple[str, Any, Any, Any]]:
         """Return (mode, start, end, state) of every segment."""
-        count, found = len(self.word), []
-        for i, (mode, _) in enumerate(self.word):
+        count, found = len(self.itinerary), []
+        for i, (mode, _) in enumerate(self.itinerary):
             t0, x0, v0 = z[3 * i : 3 * i + 3]
             t1 = z[3 * i + 3] if i + 1 < count else z[0] + 2 * mp.pi * self.periods / p["Omega"]
             if mode == "stick":
@@ -75,12 +75,12 @@ class Chain:
         return found
 
     def equations(self, p: dict[str, Any], z: list[Any]) -> list[Any]:
-        count, left = len(self.word), []
+        count, left = len(self.itinerary), []
         for i, (_, _, t1, state) in enumerate(self.pieces(p, z)):
             x, v = state(t1)
             j = 3 * ((i + 1) % count)
             left += [x - z[j + 1], v - z[j + 2]]
-            exit_ = self.word[i][1]
+            exit_ = self.itinerary[i][1]
             load = x - mp.cos(p["Omega"] * t1) - p["h"] * mp.cos(3 * p["Omega"] * t1)
             left.append({"v": v, "F+": load - p["S0"], "F-": load + p["S0"]}[exit_])
         return left
@@ -262,7 +262,7 @@ def test_the_speed_of_impact_follows_restitution() -> None:
     """At steady impact the wall takes what the force gives: energies balance, speeds in 14 digits."""
     orbit = cf.find_orbit("impact", {"A": 1.0, "w": 1.0, "d": 0.5, "e": 0.8})
     lost = 0.5 * (1 - 0.8**2) * orbit.quantity("impact_velocity") ** 2
-    hits = sum(exit_ == "wall" for _, exit_ in orbit.word)
+    hits = sum(exit_ == "wall" for _, exit_ in orbit.itinerary)
     assert hits == 1
     work = orbit.quantity("integral(A*cos(w*t)*v)")
     assert work == pytest.approx(lost + orbit.quantity("integral(c*v**2)"), rel=1e-12)

@@ -90,9 +90,9 @@ def test_the_block_comes_to_rest_on_both_sides_in_turn(block, a: float, r: float
     assert orbit.residual < 1e-12
     assert np.all(orbit.multipliers == 0.0)  # a block that has come to rest has forgotten all
     whole = orbit.as_whole()
-    word = [mode for mode, _ in whole.word]
-    assert sorted(word) == ["chatter", "chatter", "left", "right"]
-    k = word.index("right")
+    itinerary = [mode for mode, _ in whole.itinerary]
+    assert sorted(itinerary) == ["chatter", "chatter", "left", "right"]
+    k = itinerary.index("right")
     with mpmath.workdps(50):
         times, rests = impacts(mpmath.mpf(a), mpmath.mpf(4), mpmath.mpf(r))
         lifts = (mpmath.pi - mpmath.acos(1 / mpmath.mpf(a))) / 4
@@ -101,7 +101,7 @@ def test_the_block_comes_to_rest_on_both_sides_in_turn(block, a: float, r: float
         left - whole.begins[k, 0]
     ) % orbit.period == pytest.approx(0, abs=1e-12)
     assert whole.ends[k, 0] - whole.begins[k, 0] == pytest.approx(float(times[0] - lifts), abs=1e-9)
-    flow, j = block.view(orbit.vector), (k + 1) % len(word)
+    flow, j = block.view(orbit.vector), (k + 1) % len(itinerary)
     begin = whole.begins[j]
     for share, still in ((0.999, False), (1.001, True)):
         lasts = share * float(rests - times[0])
@@ -133,7 +133,7 @@ def test_a_block_that_comes_to_rest_is_found_without_being_told(tmp_path) -> Non
     path = tmp_path / "plain.yaml"
     path.write_text(BLOCK.replace(", chatter: true", ""))
     orbit = cf.find_orbit(path, {"a": 1.05}, state=[1e-4, 0.0])
-    assert [mode for mode, _ in orbit.as_whole().word].count("chatter") == 2
+    assert [mode for mode, _ in orbit.as_whole().itinerary].count("chatter") == 2
 
 
 def test_quantities_of_a_block_that_comes_to_rest(block) -> None:

@@ -79,7 +79,7 @@ def test_a_sampled_relay_repeats_its_samples(tmp_path: Path, Ts: float, more: st
     orbit = cf.find_orbit(model, {"Ts": Ts})
     matrix = np.array([[0.0, 1.0], [-1.0, -0.6]])
     step = expm(matrix * Ts)
-    ticks = orbit.ends[np.array([exit_ == "tick" for _, exit_ in orbit.word])]
+    ticks = orbit.ends[np.array([exit_ == "tick" for _, exit_ in orbit.itinerary])]
     y = ticks[0, 1:3]
     for _ in range(len(ticks)):
         force = -0.4 if y[0] + 0.5 * y[1] > 0.0 else 0.4
@@ -103,7 +103,10 @@ def test_the_clock_of_a_symmetric_relay_is_its_own_image(tmp_path: Path) -> None
     assert orbit.symmetric and orbit.period == pytest.approx(plain.period, abs=1e-11)
     assert np.sort(orbit.multipliers) == pytest.approx(np.sort(plain.multipliers), abs=1e-10)
     half = orbit.as_half()
-    ticks = [sum(exit_ == "tick" for _, exit_ in word) for word in (half.system.word, orbit.word)]
+    ticks = [
+        sum(exit_ == "tick" for _, exit_ in itinerary)
+        for itinerary in (half.system.itinerary, orbit.itinerary)
+    ]
     assert half.system.half and 2 * ticks[0] == ticks[1]
     assert half.as_whole().residual < 1e-10
     with pytest.raises(cf.ModelError, match="none of the surfaces"):
@@ -293,7 +296,7 @@ def test_two_converters_whose_clocks_are_apart(tmp_path: Path, shift: str) -> No
         step = expm(matrix * (until - now))
         rest = -np.linalg.solve(matrix, 24.0 / L * np.array([*on, 0.0]))
         whole, offset, now = step @ whole, rest + step @ (offset - rest), until
-    tick = next(k for k, (_, exit_) in enumerate(orbit.word) if exit_ == "tick")
+    tick = next(k for k, (_, exit_) in enumerate(orbit.itinerary) if exit_ == "tick")
     exact = np.linalg.solve(np.eye(3) - whole, offset)
     assert np.allclose(orbit.ends[tick, 1:4], exact, atol=1e-9)
     found = np.sort(np.abs(orbit.multipliers))[-3:]

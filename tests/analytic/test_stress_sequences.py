@@ -121,5 +121,5 @@ def test_a_release_at_the_largest_force(excess: float) -> None:
     start = Start(0.0, 1.25 + excess, 0.0, SLIDE_DOWN, 0 if excess else 1)
     event = next(follow(law, start, 12.0))
     assert float(event.t) == pytest.approx(2 * math.pi, abs=1e-12)
-    assert motion.word[0] == ("slide-", "v")
+    assert motion.itinerary[0] == ("slide-", "v")
     assert motion.times[0] == pytest.approx(float(event.t), abs=1e-9)

@@ -13,7 +13,7 @@ import contfric as cf
 def follow(orbit: cf.Orbit, acceleration: object, count: int) -> int:
     """Integrate each segment of an orbit; return how many were compared."""
     checked = 0
-    for i, (mode, _) in enumerate(orbit.word):
+    for i, (mode, _) in enumerate(orbit.itinerary):
         (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
 
         def rates(t: float, y: np.ndarray, mode: str = mode) -> np.ndarray:
@@ -58,7 +58,7 @@ def test_two_blocks_on_a_belt() -> None:
         return held(mode, (0, 1), -stiffness @ y[:2], kinetic)
 
     assert follow(orbit, acceleration, 2) >= 4
-    for (mode, _), begin in zip(orbit.word, orbit.begins, strict=True):
+    for (mode, _), begin in zip(orbit.itinerary, orbit.begins, strict=True):
         for letter, v in zip(mode, begin[3:], strict=True):
             if letter == "s":
                 assert v == pytest.approx(p["vb"], abs=1e-11)
@@ -124,7 +124,7 @@ def test_a_drill_string_sticks_and_slips_as_an_integrator_says() -> None:
         return float(forces(y)[3] - p["S0"])
 
     stops.terminal = lets_go.terminal = True  # type: ignore[attr-defined]
-    release = next(i for i, (mode, _) in enumerate(orbit.word) if mode == "p")
+    release = next(i for i, (mode, _) in enumerate(orbit.itinerary) if mode == "p")
     y, period = np.array(orbit.begins[release][1:]), 0.0
     for rates, event in ((slips, stops), (sticks, lets_go)):
         found = solve_ivp(
@@ -175,7 +175,9 @@ def test_a_beam_of_twelve_modes_touches_where_the_linear_response_is_the_gap() -
     diagram = cf.explore(orbit, "W", (6.1, 6.14), max_periods=1, max_step=0.2)
     grazing = next(b for b in diagram.bifurcations if b.kind is cf.Kind.GS)
     assert grazing.params["W"] == pytest.approx(touches, abs=1e-10)
-    hitting = next(b for b in diagram.branches if len(b[0].word) == 2 and b[0].word[0][1] == "stop")
+    hitting = next(
+        b for b in diagram.branches if len(b[0].itinerary) == 2 and b[0].itinerary[0][1] == "stop"
+    )
     first = min((hitting[0], hitting[-1]), key=lambda orbit: orbit.params["W"])
     free = next(b for b in diagram.branches if b is not hitting)[-1]
     assert free.params["W"] == pytest.approx(first.params["W"], abs=1e-9)

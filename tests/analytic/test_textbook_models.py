@@ -78,7 +78,7 @@ def test_boost_converter_in_discontinuous_conduction(tmp_path) -> None:
     exact = np.sort_complex(np.linalg.eigvals(matrix))
     assert np.allclose(np.sort_complex(orbit.multipliers), exact, atol=1e-11)
     empty = cf.find_orbit(model, {"R": 35.0})
-    assert [mode for mode, _ in empty.word].count("empty") == 1
+    assert [mode for mode, _ in empty.itinerary].count("empty") == 1
 
     def next_voltage(u: float) -> float:
         """From the tick with no current: on, off until the current dies, the rest empty."""

@@ -10,10 +10,10 @@ from contfric.signature import (
     NEVER,
     is_closed_walk,
     load_signature,
-    mirror_word,
+    mirror_itinerary,
     parse_signature,
     reduce_signature,
-    reduced_word,
+    reduced_itinerary,
     successors,
     swap_stop,
     swap_stops,
@@ -39,7 +39,7 @@ PUBLISHED = {
     "stick": {"F+": "x+v-", "F-": "x-v+"},
 }
 
-#: name -> (segments, periods, sticks, reduced word)
+#: name -> (segments, periods, sticks, reduced itinerary)
 TYPES = {
     "2s": (6, 1, 2, WORD_2S),
     "2a": (6, 1, 2, WORD_2S),
@@ -70,7 +70,7 @@ def test_unknown_domain_is_named() -> None:
 
 @pytest.mark.parametrize("name", TYPES)
 def test_published_types(name: str) -> None:
-    segments, periods, stops, word = TYPES[name]
+    segments, periods, stops, itinerary = TYPES[name]
     signature = load_signature(name)
     assert (len(signature.segments), signature.periods, signature.stops) == (
         segments,
@@ -79,7 +79,7 @@ def test_published_types(name: str) -> None:
     )
     assert signature.symmetric is (name[1] == "s")
     assert signature.auto_name(bool(signature.symmetric)) == name
-    assert reduced_word(signature) == word
+    assert reduced_itinerary(signature) == itinerary
 
 
 def test_same_orbit_type_written_from_another_segment() -> None:
@@ -96,7 +96,7 @@ def test_symmetry_of_the_published_types() -> None:
         assert not load_signature(name).is_mirror_symmetric
         assert load_signature(name).mirror() != load_signature(name)
     # the mirror image of a stop at x > 0 is one at x < 0
-    assert mirror_word(WORD_1A, COULOMB) == (UP, HELD_HIGH, DOWN)
+    assert mirror_itinerary(WORD_1A, COULOMB) == (UP, HELD_HIGH, DOWN)
 
 
 def test_2s_and_2a_are_the_same_walk() -> None:
@@ -104,11 +104,11 @@ def test_2s_and_2a_are_the_same_walk() -> None:
     assert load_signature("2a").mirror() == load_signature("2a")
 
 
-def test_labels_inside_a_slide_do_not_change_the_reduced_word() -> None:
+def test_labels_inside_a_slide_do_not_change_the_reduced_itinerary() -> None:
     """Event T: the slide of 1a that touches F- gains x-v- and x0v-."""
     plain = parse_signature("x0v+ -> stick -> x+v- -> x0v- -> stick -> x-v+", COULOMB)
     touched = "x0v+ -> stick -> x+v- -> x0v- -> x-v- -> x0v- -> stick -> x-v+"
-    assert reduced_word(parse_signature(touched, COULOMB)) == reduced_word(plain)
+    assert reduced_itinerary(parse_signature(touched, COULOMB)) == reduced_itinerary(plain)
 
 
 def test_reduced_segments_of_1a() -> None:
@@ -127,14 +127,14 @@ def test_walk_of_one_mode_is_one_piece() -> None:
     assert pieces[0].pair == ("slide+", NEVER)
     assert is_closed_walk([pieces[0].pair], COULOMB)
     assert not is_closed_walk([("stick", NEVER)], COULOMB)
-    assert mirror_word((pieces[0].pair,), COULOMB) == (("slide-", NEVER),)
+    assert mirror_itinerary((pieces[0].pair,), COULOMB) == (("slide-", NEVER),)
 
 
 def test_crossing_sliding_connects_0s_1a_2s() -> None:
     """CS_s: 0s on one side; 1a, its mirror image and 2s on the other."""
     one = swap_stop(WORD_0S, 1, "F-", COULOMB)
     assert one == WORD_1A
-    assert swap_stop(WORD_0S, 0, "F+", COULOMB) == mirror_word(WORD_1A, COULOMB)
+    assert swap_stop(WORD_0S, 0, "F+", COULOMB) == mirror_itinerary(WORD_1A, COULOMB)
     assert swap_stop(one, 0, "F+", COULOMB) == WORD_2S
     assert swap_stops(WORD_0S, {0: "F+", 1: "F-"}, COULOMB) == WORD_2S
     assert swap_stops(WORD_2S, {0: "F+", 2: "F-"}, COULOMB) == WORD_0S
@@ -146,7 +146,7 @@ def test_stick_at_the_seam_is_removed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("word", "joint", "surface", "message"),
+    ("itinerary", "joint", "surface", "message"),
     [
         (WORD_0S, 0, "F-", "no stick that ends at F- fits between 'slide\\+' and 'slide-'"),
         (WORD_2S, 0, "F-", "ends at F\\+, not at F-"),
@@ -158,14 +158,14 @@ def test_stick_at_the_seam_is_removed() -> None:
     ],
 )
 def test_impossible_edits(
-    word: tuple[tuple[str, str], ...], joint: int, surface: str, message: str
+    itinerary: tuple[tuple[str, str], ...], joint: int, surface: str, message: str
 ) -> None:
     with pytest.raises(NotationError, match=message):
-        swap_stop(word, joint, surface, COULOMB)
+        swap_stop(itinerary, joint, surface, COULOMB)
 
 
 @pytest.mark.parametrize(
-    "word", [(), (("glide", "v"),), (("slide+", "G"),), (UP, UP), (DOWN, DOWN)]
+    "itinerary", [(), (("glide", "v"),), (("slide+", "G"),), (UP, UP), (DOWN, DOWN)]
 )
-def test_what_is_no_closed_walk(word: tuple[tuple[str, str], ...]) -> None:
-    assert not is_closed_walk(word, COULOMB)
+def test_what_is_no_closed_walk(itinerary: tuple[tuple[str, str], ...]) -> None:
+    assert not is_closed_walk(itinerary, COULOMB)

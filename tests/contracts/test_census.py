@@ -37,7 +37,7 @@ def test_table_and_text(census: cf.Census) -> None:
     assert "1.37216, 0" in rows[1] and "x0v+ -> stick" in rows[1]
     text = str(census)
     assert census.table() in text
-    for fate, count in census.words.items():
+    for fate, count in census.itineraries.items():
         assert (f"{count}  {fate.value}" in text) == (count > 0)
     assert all(line in text for line in census.limits)
 

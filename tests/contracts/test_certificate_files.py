@@ -22,7 +22,7 @@ from contfric.certify.files import certificate_data, verify
 from contfric.certify.orbit import certify_orbit
 from contfric.cli import main
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.verify.file import check_text
 from tests.certificate_oracle import false_statements, mutated
 
@@ -90,7 +90,7 @@ def test_inadmissible_orbits_are_refused(
 ) -> None:
     found = cf.solve_orbit("coulomb", name, params)
     vector = found.model.vector({**params, **beyond})
-    wrong = polish(replace(found, vector=vector))
+    wrong = refine(replace(found, vector=vector))
     assert wrong.converged
     assert not wrong.admissible
     assert wrong.certify().admissible.verdict == "refuted"

@@ -94,9 +94,9 @@ def write(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-def interrupt_at(word: str):
+def interrupt_at(itinerary: str):
     def progress(text: str) -> None:
-        if word in text:
+        if itinerary in text:
             raise KeyboardInterrupt
 
     return progress

@@ -222,7 +222,7 @@ _INTERRUPT = """
 import signal
 from contfric.cli.progress import ProgressLine
 def show(self, text):
-    if {word!r} in text:
+    if {itinerary!r} in text:
         signal.raise_signal(signal.SIGINT)
 ProgressLine.show = show
 """
@@ -230,7 +230,7 @@ ProgressLine.show = show
 
 def test_interrupted_run_is_saved_and_says_so(study, tmp_path) -> None:
     out = tmp_path / "out"
-    before = _INTERRUPT.format(word="branch 2")
+    before = _INTERRUPT.format(itinerary="branch 2")
     path = study(HEAD + EXPLORE)
     code, printed, err = finish(command("run", path, "--out", out, "--json", before=before))
     assert code == Exit.INTERRUPTED
@@ -242,7 +242,7 @@ def test_interrupted_run_is_saved_and_says_so(study, tmp_path) -> None:
 
 
 def test_interrupted_before_anything_was_found(study, tmp_path) -> None:
-    before = _INTERRUPT.format(word="simulating")
+    before = _INTERRUPT.format(itinerary="simulating")
     path = study(HEAD + EXPLORE)
     code, printed, err = finish(command("run", path, "--out", tmp_path / "out", before=before))
     assert (code, printed) == (Exit.INTERRUPTED, "")

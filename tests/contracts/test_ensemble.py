@@ -18,7 +18,7 @@ from scipy import stats
 import contfric as cf
 from contfric.ensembles.rows import Rows
 from contfric.ensembles.statistics import share_of, sobol_indices
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.study.result import RunStatus
 
 RANGE = (0.48, 0.55)
@@ -71,7 +71,7 @@ def solved_at(branch: cf.Branch, value: float) -> list[cf.Orbit]:
             near = k if abs(branch.values[k] - value) < abs(branch.values[k + 1] - value) else k + 1
             vector = branch[near].vector.copy()
             vector[branch.model.index_of("Omega")] = value
-            orbit = polish(replace(branch[near], vector=vector))
+            orbit = refine(replace(branch[near], vector=vector))
             assert orbit is not None and orbit.converged
             orbits.append(orbit)
     return orbits

@@ -544,7 +544,9 @@ def test_files_are_reproducible(branch: Any, tmp_path: Path, suffix: str) -> Non
         path = save_figure(fig, tmp_path / f"{name}.{suffix}", dpi=60)
         content.append(path.read_bytes())
     assert content[0] == content[1]
-    assert not any(word in content[0] for word in (b"CreationDate", b"dc:date", b"Software"))
+    assert not any(
+        itinerary in content[0] for itinerary in (b"CreationDate", b"dc:date", b"Software")
+    )
 
 
 @pytest.mark.parametrize("facecolor", ["white", "none"])

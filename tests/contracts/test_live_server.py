@@ -114,8 +114,8 @@ def test_a_browser_drags(url: str) -> None:
 
     options = webdriver.ChromeOptions()
     options.binary_location = str(BROWSER)
-    for word in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
-        options.add_argument(f"--{word}")
+    for itinerary in ("headless=new", "no-sandbox", "disable-gpu", "disable-background-networking"):
+        options.add_argument(f"--{itinerary}")
     browser = webdriver.Chrome(options, webdriver.ChromeService(DRIVER))
     try:
         browser.set_script_timeout(120)

@@ -134,8 +134,8 @@ def test_a_tie_is_kept_along_a_branch_and_in_files(tmp_path: Path) -> None:
             domain=None,
             periods=2.0,
         )
-        known = {(m, e) for m, e in point.as_whole().word}
-        assert set(free.word) <= {*known, *((e, m) for m, e in known)} or point.system.holds
+        known = {(m, e) for m, e in point.as_whole().itinerary}
+        assert set(free.itinerary) <= {*known, *((e, m) for m, e in known)} or point.system.holds
     save(branch, tmp_path / "branch.npz")
     again = cf.load(tmp_path / "branch.npz")
     assert again.model.parameter_names == orbit.model.parameter_names
@@ -257,7 +257,7 @@ modes:
     path = tmp_path / "capsubot.yaml"
     path.write_text(text, encoding="utf-8")
     orbit = cf.find_orbit(path, {})
-    assert orbit.admissible and any(mode.startswith("slide_") for mode, _ in orbit.word)
+    assert orbit.admissible and any(mode.startswith("slide_") for mode, _ in orbit.itinerary)
 
 
 def test_a_part_of_define_may_be_an_observable_and_its_surface_have_any_name(
@@ -278,5 +278,5 @@ modes:
     path.write_text(text, encoding="utf-8")
     orbit = cf.find_orbit(path, {})
     assert orbit.admissible
-    for end, (mode, _) in zip(orbit.ends, orbit.word, strict=True):
+    for end, (mode, _) in zip(orbit.ends, orbit.itinerary, strict=True):
         assert abs(end[1] + 0.1 * end[2]) == pytest.approx(0.2, abs=1e-12), mode

@@ -13,7 +13,7 @@ from contfric.compiled import allocating_helper, flow_signature, kernel
 from contfric.flow import forced_oscillator
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Status
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -55,7 +55,7 @@ def test_an_exploration_goes_on_elsewhere(model: Model) -> None:
 
 def test_a_solve_returns_its_status(model: Model) -> None:
     orbit = cf.find_orbit("coulomb", {**PARAMS, "Omega": 0.535})
-    system = build_system(model, orbit.system.word, orbit.system.periods)
-    solved = polish(replace(orbit, system=system))
+    system = build_system(model, orbit.system.itinerary, orbit.system.periods)
+    solved = refine(replace(orbit, system=system))
     assert not solved.converged
     assert solved.status is Status.NOT_FINITE

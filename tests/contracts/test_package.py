@@ -36,8 +36,8 @@ def test_every_link_of_the_long_description_works_without_the_repository(descrip
     assert all(target.startswith("https://") for target in targets)
     assert "![" not in description
     assert "docs/" not in re.sub(r"`[^`]*`|```.*?```", "", description, flags=re.DOTALL)
-    for word in ("# contfric", "## Ten lines of Python", "import contfric as cf", "glossary"):
-        assert word in description
+    for itinerary in ("# contfric", "## Ten lines of Python", "import contfric as cf", "glossary"):
+        assert itinerary in description
 
 
 def test_readme_is_a_screen_and_a_half() -> None:

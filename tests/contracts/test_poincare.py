@@ -19,7 +19,8 @@ def test_points_are_events_of_the_simulation(section: str) -> None:
     found = cf.poincare("coulomb", CHAOS, section=section, periods=40, transient=0)
     events = cf.simulate("coulomb", CHAOS, periods=40)
     chosen = [
-        mode == "stick" if section == "releases" else exit_ == "v" for mode, exit_ in events.word
+        mode == "stick" if section == "releases" else exit_ == "v"
+        for mode, exit_ in events.itinerary
     ]
     np.testing.assert_array_equal(found.states, events.states[chosen])
     np.testing.assert_array_equal(found.times, events.times[chosen])
@@ -60,8 +61,8 @@ def test_release_map_against_single_releases() -> None:
         events = cf.simulate(
             "coulomb", CHAOS, state=[x, -1e-300], time=time, periods=30, domain="x+v-"
         )
-        first = next(i for i, (mode, _) in enumerate(events.word) if mode == "stick")
-        at = events.times[first] + (0.5 * period if events.word[first][1] == "F-" else 0.0)
+        first = next(i for i, (mode, _) in enumerate(events.itinerary) if mode == "stick")
+        at = events.times[first] + (0.5 * period if events.itinerary[first][1] == "F-" else 0.0)
         apart = abs(found.images[k] - at % period)
         assert min(apart, period - apart) < 1e-8
 
@@ -72,7 +73,7 @@ def test_fixed_points_are_orbits() -> None:
     period = orbit.period
     releases = [
         (end + (0.5 * period if exit_ == "F-" else 0.0)) % period
-        for (mode, exit_), end in zip(orbit.word, orbit.ends[:, 0], strict=True)
+        for (mode, exit_), end in zip(orbit.itinerary, orbit.ends[:, 0], strict=True)
         if mode == "stick"
     ]
     for release in releases:

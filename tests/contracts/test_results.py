@@ -82,8 +82,8 @@ def test_orbit(orbit, tmp_path) -> None:
 def test_full_form(orbit, tmp_path) -> None:
     signature = load_signature("1a")
     modes = [orbit.model.domain_by_name[d].mode for d in signature.segments]
-    word = tuple(zip(modes, signature.surfaces, strict=True))
-    system = build_system(orbit.model, word, 1, False, signature.segments)
+    itinerary = tuple(zip(modes, signature.surfaces, strict=True))
+    system = build_system(orbit.model, itinerary, 1, False, signature.segments)
     full = dataclasses.replace(orbit, system=system, joints=np.zeros((6, 3)))
     loaded = round_trip(full, tmp_path)
     assert loaded.system is system
@@ -397,7 +397,7 @@ def test_header_is_checked(orbit, tmp_path, changes, message) -> None:
 
 def test_a_model_without_a_name_can_be_passed(orbit, tmp_path) -> None:
     own = dataclasses.replace(orbit.model, name="mine")
-    system = build_system(own, orbit.system.word, orbit.periods, orbit.system.half)
+    system = build_system(own, orbit.system.itinerary, orbit.periods, orbit.system.half)
     path = tmp_path / "x.npz"
     cf.save(dataclasses.replace(orbit, system=system), path)
     with pytest.raises(cf.ResultFileError, match="'mine', which is not installed"):

@@ -45,7 +45,7 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         ("", 1, "must be a mapping"),
         ("model: [\n", 2, "no valid YAML"),
         (HEAD + "model: coulomb\n", 3, r"key 'model' is given twice \(first in line 1\)"),
-        # unknown words
+        # unknown itineraries
         (HEAD + "exlpore: {}\n", 3, "unknown key 'exlpore'; did you mean 'explore'"),
         (HEAD + "explore:\n  parameter: Omega\n  rnage: [0.4, 0.6]\n", 5, "did you mean 'range'"),
         ("model: colomb\n", 1, "unknown model 'colomb'; did you mean 'coulomb'"),
@@ -565,9 +565,9 @@ def test_the_orbit_of_a_failed_run_is_saved(tmp_path, write, monkeypatch) -> Non
         assert loaded.name == "1a"
 
 
-def interrupt_at(word: str):
+def interrupt_at(itinerary: str):
     def progress(text: str) -> None:
-        if word in text:
+        if itinerary in text:
             raise KeyboardInterrupt
 
     return progress

@@ -45,7 +45,7 @@ def _on(orbit: cf.Orbit, section: str | float) -> np.ndarray[Any, Any]:
         (section == "stops" and exit_ == "v")
         or (section == "releases" and mode == "stick")
         or (section == "F+" and exit_ == "F+")
-        for mode, exit_ in orbit.word
+        for mode, exit_ in orbit.itinerary
     ]
     found = list(orbit.ends[np.array(chosen), 1:])
     if section == "F+":  # motion is not cut there while it slides
@@ -61,7 +61,7 @@ def _crossings(orbit: cf.Orbit) -> list[np.ndarray[Any, Any]]:
         return float(orbit.state(t)[0] - force - orbit.params["S0"])
 
     found = []
-    for i, (mode, _) in enumerate(orbit.word):
+    for i, (mode, _) in enumerate(orbit.itinerary):
         if mode == "stick":
             continue
         # inside of the segment: at its ends the load may stand at the limit to rounding
@@ -119,7 +119,7 @@ def test_impacts() -> None:
     at = [model.defaults[name]]
     (wall,) = model.reset_by_surface
     sweep = cf.sweep(model, name, at, section=wall, transient=500.0)
-    hits = [k for k, (_, exit_) in enumerate(orbit.word) if exit_ == wall]
+    hits = [k for k, (_, exit_) in enumerate(orbit.itinerary) if exit_ == wall]
     np.testing.assert_allclose(
         np.sort(sweep.up.states, axis=0), np.sort(orbit.ends[hits, 1:], axis=0), atol=1e-9
     )

@@ -20,9 +20,9 @@ def test_samples_are_the_solution_of_the_equation_of_motion(time: float) -> None
     found = cf.simulate("coulomb", PARAMS, state=[1.3, 0.5], time=time, periods=3)
     period = 4 * np.pi
     bounds = [time, *(found.cycles * period + found.times), time + 3 * period]
-    words = [mode for mode, _ in found.word] + [found.last[3]]
+    itineraries = [mode for mode, _ in found.itinerary] + [found.last[3]]
     y = np.array([1.3, 0.5])
-    for mode, low, high in zip(words, bounds[:-1], bounds[1:], strict=True):
+    for mode, low, high in zip(itineraries, bounds[:-1], bounds[1:], strict=True):
         sign = {"slide+": 1.0, "slide-": -1.0, "stick": 0.0}[mode]
 
         def field(t: float, y: np.ndarray, sign: float = sign) -> list[float]:
@@ -44,7 +44,7 @@ def test_every_model_meets_its_own_events_and_end(name: str) -> None:
     view = model.view(model.vector(found.params))
     times = found.cycles * view.period + found.times
     for (_, surface), time, phase, state in zip(
-        found.word, times, found.times, found.states, strict=True
+        found.itinerary, times, found.times, found.states, strict=True
     ):
         reset = surface in model.reset_by_surface
         behind = view.reset(surface, float(phase), state) if reset else state
@@ -68,7 +68,7 @@ def test_a_table_has_all_events_once_and_runs_on() -> None:
     found = cf.simulate("bouncing-ball", periods=4)
     frame = found.to_dataframe(200)
     assert list(frame.columns) == ["t", *found.model.states, "mode", "event"]
-    assert [name for name in frame["event"] if name] == [surface for _, surface in found.word]
+    assert [name for name in frame["event"] if name] == [surface for _, surface in found.itinerary]
     assert np.all(np.diff(frame["t"]) >= 0.0)
     assert 200 <= len(frame) <= 200 + 2 * (len(found) + 1)
 
@@ -78,7 +78,7 @@ def test_a_figure_has_each_mode_once(name: str) -> None:
     found = cf.simulate(name, periods=4)
     ax = found.plot()
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    modes = {mode for mode, _ in found.word} | {found.last[3]}
+    modes = {mode for mode, _ in found.itinerary} | {found.last[3]}
     assert sorted(labels) == sorted([*modes, "start"])
 
 
@@ -87,7 +87,7 @@ def test_a_file_has_all_of_it(name: str, tmp_path) -> None:  # type: ignore[no-u
     found = cf.simulate(name, periods=3)
     cf.save(found, tmp_path / "t.npz")
     again = cf.load(tmp_path / "t.npz")
-    assert again.word == found.word
+    assert again.itinerary == found.itinerary
     assert (again.params, again.end) == (found.params, found.end)
     assert again.last[0] == found.last[0] and again.last[3] == found.last[3]
     times = np.linspace(found.begin[0], found.begin[0] + 1.0, 5)

@@ -42,8 +42,8 @@ def test_table_is_that_of_the_script(script: ModuleType) -> None:
     rows = re.findall(r"^\| (.*) \|$", script.table(), re.MULTILINE)[1:]
     assert len(rows) > 10
     for row in rows:
-        *words, parameter, motion = row.split(" | ")
-        assert f"| {' | '.join(words)} |" in PAGE
+        *itineraries, parameter, motion = row.split(" | ")
+        assert f"| {' | '.join(itineraries)} |" in PAGE
         # without damping the end of the bridge with one hold is located to the root of rounding
         rough = "1a, 9seg, 1hold | SS | 0.4285233972" in row
         assert float(parameter) < (1e-6 if rough else 1e-10)

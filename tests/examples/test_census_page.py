@@ -34,11 +34,11 @@ def test_output_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> No
     )
 
 
-def test_numbers_of_words() -> None:
-    from contfric.censuses.words import closed_words
+def test_numbers_of_itineraries() -> None:
+    from contfric.censuses.itineraries import closed_itineraries
     from contfric.models import load_model
 
     found = re.search(r"pair: ([\d, ]+) of the oscillator for N = ([\d, ]+),", PAGE)
     assert found is not None
     counts, stops = ([int(n) for n in part.split(",")] for part in found.groups())
-    assert [len(closed_words(load_model("coulomb"), n)) for n in stops] == counts
+    assert [len(closed_itineraries(load_model("coulomb"), n)) for n in stops] == counts

@@ -1,4 +1,4 @@
-"""The page on chaos: single points of its tables, and the words that depend on them."""
+"""The page on chaos: single points of its tables, and the itineraries that depend on them."""
 
 from __future__ import annotations
 

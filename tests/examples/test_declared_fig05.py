@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -57,8 +57,8 @@ def test_multipliers_agree(diagrams: tuple[cf.Diagram, cf.Diagram]) -> None:
     for branch in diagrams[0].branches:
         orbit = branch[len(branch) // 2]
         own = orbit.system
-        system = build_system(model, own.word, own.periods, own.half)
-        again = polish(replace(orbit, system=system))
+        system = build_system(model, own.itinerary, own.periods, own.half)
+        again = refine(replace(orbit, system=system))
         assert again.converged
         assert again.x_max == pytest.approx(orbit.x_max, abs=1e-9)
         if not branch.bridge:  # a bridge has an infinite one

@@ -29,7 +29,7 @@ def test_page_runs(
 
 
 EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1:]
-#: The words of their orbits: domains may be many, modes are few.
+#: The itineraries of their orbits: domains may be many, modes are few.
 WORDS = {
     "neuron": {("rest", "threshold")},
     "clock": {("forth-", "middle"), ("forth+", "stop"), ("back", "stop")},
@@ -62,5 +62,5 @@ def test_each_example_is_checked_and_found(tmp_path: Path, text: str) -> None:
     name = text.split()[1]
     orbit = cf.find_orbit(path, state=STARTS.get(name)).as_whole()
     assert orbit.converged and orbit.admissible and orbit.stable
-    assert set(orbit.word) <= WORDS[orbit.model.name], orbit.word
-    assert {mode for mode, _ in orbit.word} == {mode for mode, _ in WORDS[orbit.model.name]}
+    assert set(orbit.itinerary) <= WORDS[orbit.model.name], orbit.itinerary
+    assert {mode for mode, _ in orbit.itinerary} == {mode for mode, _ in WORDS[orbit.model.name]}

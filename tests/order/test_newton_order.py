@@ -9,7 +9,7 @@ import pytest
 
 import contfric as cf
 from contfric.orbit.blocks import linearise
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 CASES = {
     "1a": {"Omega": 0.5, "S": 0.32, "S0": 0.4},
@@ -61,7 +61,7 @@ def test_solved_from_afar_nothing_is_left(name: str) -> None:
     orbit = cf.solve_orbit("coulomb", name, CASES[name])
     noise = np.random.default_rng(9).uniform(-1e-3, 1e-3, orbit.joints.shape)
     for damped in (False, True):
-        solved = polish(replace(orbit, joints=orbit.joints + noise), damped=damped)
+        solved = refine(replace(orbit, joints=orbit.joints + noise), damped=damped)
         assert solved.converged and solved.residual < 1e-14
         assert np.max(np.abs(solved.joints - orbit.joints)) < 1e-12
 
@@ -118,7 +118,7 @@ def test_points_between_steps_lie_on_the_branch_to_second_order() -> None:
         vector = branch[i].vector.copy()
         vector[orbit.model.index_of("Omega")] = 0.5 * (branch.values[i] + branch.values[i + 1])
         middle = 0.5 * (branch.joints[i] + branch.joints[i + 1])
-        exact = polish(replace(branch[i], joints=middle, vector=vector), damped=False)
+        exact = refine(replace(branch[i], joints=middle, vector=vector), damped=False)
         assert exact.converged
         errors.append(float(np.max(np.abs(exact.joints - middle))))
         distances.append(abs(float(branch.values[i + 1] - branch.values[i])))

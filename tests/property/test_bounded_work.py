@@ -18,7 +18,7 @@ from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
 from contfric.curves.points import solve_point
 from contfric.curves.problem import border_of, box_of, problem_of
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Starts, and time that they may take together (s): each is a few thousand evaluations at worst.
 STARTS, MOST = 60, 20.0
@@ -68,6 +68,6 @@ def test_branches_and_orbits(diagram: cf.Diagram) -> None:
             joints = orbit.joints + share * wild(draw, orbit.joints.shape)
             moved = replace(orbit, joints=joints, vector=vector)
             first_point(moved, settings, wild(draw, joints.shape), float(wild(draw, (1,))[0]))
-            polish(moved)
+            refine(moved)
             moved.margins.sum()
     assert time.monotonic() - began < MOST

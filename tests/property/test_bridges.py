@@ -104,7 +104,7 @@ def computed(found: cf.Diagram) -> Iterator[tuple[int, cf.Branch]]:
 
 def domain_of(orbit: cf.Orbit, i: int) -> str:
     """The domain in which segment i of the whole orbit starts."""
-    mode = orbit.word[i][0]
+    mode = orbit.itinerary[i][0]
     if mode == "stick":
         return "stick"
     u, S0 = load(orbit, *orbit.cycle[i, :2]), orbit.params["S0"]
@@ -122,7 +122,7 @@ def motion_errors(orbit: cf.Orbit) -> Iterator[tuple[str, float]]:
     start = orbit.cycle.copy()
     assert np.max(np.abs(start[:, 2])) < MOTION  # every joint of this model is at rest
     start[:, 2] = 0.0
-    for i, (mode, exit_) in enumerate(orbit.word):
+    for i, (mode, exit_) in enumerate(orbit.itinerary):
         begin, end = start[i], orbit.ends[i]
         if is_hold(exit_):
             yield from held_errors(orbit, i)
@@ -132,10 +132,10 @@ def motion_errors(orbit: cf.Orbit) -> Iterator[tuple[str, float]]:
 
 def simulated_error(orbit: cf.Orbit, i: int, begin: np.ndarray, end: np.ndarray) -> float:
     """Distance of the simulated end of a segment from the next joint."""
-    touches = orbit.word[(i + 1) % len(orbit.word)][1] == TOUCH
+    touches = orbit.itinerary[(i + 1) % len(orbit.itinerary)][1] == TOUCH
     duration = end[0] - begin[0]
     if (
-        touches and orbit.word[i][0] == "stick"
+        touches and orbit.itinerary[i][0] == "stick"
     ):  # a touch of the limit may release: a little before it
         duration -= BEFORE_TOUCH * (1.0 + duration)
     longest = duration if touches else 1.5 * duration + 1.0
@@ -150,7 +150,7 @@ def simulated_error(orbit: cf.Orbit, i: int, begin: np.ndarray, end: np.ndarray)
     )
     if touches:  # whether a touch is met is a matter of rounding; where the motion is there is not
         return float(np.max(np.abs(path.last[2] - [end[1], 0.0])))
-    assert path.word == (orbit.word[i],), (orbit, i, path.word)
+    assert path.itinerary == (orbit.itinerary[i],), (orbit, i, path.itinerary)
     period = 2.0 * np.pi / orbit.params["Omega"]
     time = path.cycles[0] * period + path.times[0]
     # a nearly tangential exit is where its rate says: what it misses is the error of the observable
@@ -170,10 +170,10 @@ def held_errors(orbit: cf.Orbit, i: int) -> Iterator[tuple[str, float]]:
     yield "hold at rest", max(abs(end[1] - x), abs(end[2]))
     loads = np.array([load(orbit, t, x) for t in np.linspace(begin, end[0], 50)])
     yield "hold |u| <= S0", max(0.0, float(np.max(np.abs(loads))) - S0)
-    side = -1.0 if orbit.word[(i + 1) % len(orbit.word)][0] == "slide+" else 1.0
+    side = -1.0 if orbit.itinerary[(i + 1) % len(orbit.itinerary)][0] == "slide+" else 1.0
     yield "hold could be left", max(0.0, S - float(np.min(side * loads)))
-    before = orbit.word[i - 1][0]
-    if orbit.word[i][1] != TOUCH:  # SS
+    before = orbit.itinerary[i - 1][0]
+    if orbit.itinerary[i][1] != TOUCH:  # SS
         yield "pin on the surface", abs(side * loads[0] - S0)
     elif before == "stick":  # AS: on the limit, and stationary
         omega, h = orbit.params["Omega"], orbit.params["h"]
@@ -348,7 +348,7 @@ def apart(one: cf.Orbit, other: cf.Orbit) -> float:
 
 
 @each_case
-def test_at_cs_both_words_have_the_same_orbit(case: int | str) -> None:
+def test_at_cs_both_itineraries_have_the_same_orbit(case: int | str) -> None:
     found = diagram(case)
     for node in found.nodes:
         if node.bifurcation.kind is not cf.Kind.CS or node.mirrored:
@@ -380,7 +380,7 @@ def long_run(count: int, first: int) -> None:
         test_both_ends_of_a_bridge_meet_a_branch,
         test_nothing_is_loose_and_all_is_connected,
         test_ends_of_bridges_have_their_reasons,
-        test_at_cs_both_words_have_the_same_orbit,
+        test_at_cs_both_itineraries_have_the_same_orbit,
     ]
     done = bridges = failed = 0
     for seed, orbit, scene in scenes(count, first):

@@ -17,12 +17,12 @@ from contfric.atlas.matching import identity, stops_distance
 from contfric.censuses.census import _Census
 from contfric.censuses.conditions import Arcs, Fate, least_periods
 from contfric.censuses.grid import Limits
+from contfric.censuses.itineraries import canonical_pair, closed_itineraries, letters_of, stops_of
 from contfric.censuses.sections import sections_of
-from contfric.censuses.words import canonical_pair, closed_words, letters_of, stops_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import polish
-from contfric.signature import ReducedWord
+from contfric.orbit.solve import refine
+from contfric.signature import ReducedItinerary
 from contfric.signature.edits import is_closed_walk
 
 SEEDS = range(12)
@@ -80,7 +80,7 @@ def crossings(branch: cf.Branch, value: float) -> Iterator[Orbit]:
         vector = branch[int(i)].vector.copy()
         vector[branch[0].model.index_of(branch.parameter)] = value
         guess = Orbit(branch.system, joints, vector, np.inf, Status.NOT_CONVERGED)
-        solved = polish(guess, damped=False)
+        solved = refine(guess, damped=False)
         if solved.converged and solved.admissible:
             yield solved
 
@@ -91,7 +91,7 @@ def test_every_attractor_is_listed(seed: int) -> None:
     assert found.complete
     for orbit in attractors(seed):
         if asked_for(orbit):
-            assert has(found, orbit), (orbit, orbit.word)
+            assert has(found, orbit), (orbit, orbit.itinerary)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -107,7 +107,7 @@ def test_every_orbit_of_every_branch_is_listed(seed: int) -> None:
         for branch in diagram.branches:
             for orbit in crossings(branch, omega):
                 if asked_for(orbit):
-                    assert has(found, orbit), (orbit, orbit.word, start)
+                    assert has(found, orbit), (orbit, orbit.itinerary, start)
 
 
 @pytest.mark.slow
@@ -134,7 +134,7 @@ def test_orbits_are_solved_admissible_and_within_the_limits(seed: int) -> None:
 
 def settled_from(orbit: Orbit) -> Orbit:
     """Return what a long simulation converges to that starts on an orbit, half way along a slide."""
-    slide = next(i for i, (mode, _) in enumerate(orbit.word) if mode != "stick")
+    slide = next(i for i, (mode, _) in enumerate(orbit.itinerary) if mode != "stick")
     time = 0.5 * float(orbit.cycle[slide, 0] + orbit.ends[slide, 0])
     return cf.find_orbit("coulomb", orbit.params, state=orbit.state(time), time=time)
 
@@ -146,7 +146,7 @@ def test_stable_orbits_attract(seed: int) -> None:
 
 
 def test_a_small_basin() -> None:
-    """Two symmetric attractors of one word: twelve random simulations met only one of them."""
+    """Two symmetric attractors of one itinerary: twelve random simulations met only one of them."""
     params = {"Omega": 0.261, "S": 0.1266, "S0": 0.3053, "zeta": 0.0982}
     found = cf.census("coulomb", params)
     assert [(orbit.name, orbit.stable) for orbit in found] == [("2s", True), ("2s", True)]
@@ -183,33 +183,35 @@ def test_what_is_pruned_has_no_orbit(seed: int) -> None:
     for section in sections_of(model, state.vector):
         state.search(section)
     found = set(state.catalogue.orbits)
-    assert len(found) == len({(canonical_pair(model, o.word), o.periods) for o in census(seed)})
+    assert len(found) == len(
+        {(canonical_pair(model, o.itinerary), o.periods) for o in census(seed)}
+    )
     assert not found & ruled_out
 
 
-# ---------------------------------------------------------------------------------------- words
+# ---------------------------------------------------------------------------------------- itineraries
 
 
 @pytest.mark.parametrize("stops", [1, 2, 3, 4])
-def test_words_are_all_closed_words(stops: int) -> None:
+def test_itineraries_are_all_closed_itineraries(stops: int) -> None:
     """Against all sequences of letters, tested one by one."""
     model = cf.load_model("coulomb")
-    brute: set[ReducedWord] = set()
+    brute: set[ReducedItinerary] = set()
     for length in range(1, 2 * stops + 1):
-        for word in product(letters_of(model), repeat=length):
-            if stops_of(model, word) <= stops and is_closed_walk(word, model):
-                brute.add(canonical_pair(model, word))
-    words = closed_words(model, stops)
-    assert len(words) == len(set(words))
-    assert set(words) == brute
+        for itinerary in product(letters_of(model), repeat=length):
+            if stops_of(model, itinerary) <= stops and is_closed_walk(itinerary, model):
+                brute.add(canonical_pair(model, itinerary))
+    itineraries = closed_itineraries(model, stops)
+    assert len(itineraries) == len(set(itineraries))
+    assert set(itineraries) == brute
 
 
 @pytest.mark.parametrize("stops", [5, 8, 10])
-def test_number_of_words(stops: int) -> None:
+def test_number_of_itineraries(stops: int) -> None:
     """Burnside's lemma: closed walks of [[1, 2], [2, 1]] up to rotation and mirror image.
 
     After a slide come three choices: reversal, a stick released onwards, a stick released back. The
-    mirror image exchanges the directions; a rotation by r with it fixes the words whose first r
+    mirror image exchanges the directions; a rotation by r with it fixes the itineraries whose first r
     letters are followed by their mirror image, and so on: (3^g - (-1)^g) of them, g = gcd(n, r), if
     n / g is even.
     """
@@ -223,7 +225,7 @@ def test_number_of_words(stops: int) -> None:
                 fixed += 3**g - (-1) ** g
         assert fixed % (2 * n) == 0
         total += fixed // (2 * n)
-    assert len(closed_words(cf.load_model("coulomb"), stops)) == total
+    assert len(closed_itineraries(cf.load_model("coulomb"), stops)) == total
 
 
 @st.composite
@@ -255,13 +257,13 @@ def test_turns_against_all_phases(found: dict[tuple[str, str], Arcs], exits: lis
             # phases at one instant are one after the other, however near
             at = min(k + 360 * turn for k in later for turn in range(10) if k + 360 * turn >= at)
         least = min(least, max(1.0, np.ceil((at - start) / 360.0)))
-    word = tuple(("stick", name) for name in exits)
-    assert least_periods(word, found) == least
+    itinerary = tuple(("stick", name) for name in exits)
+    assert least_periods(itinerary, found) == least
 
 
 def test_ledger_counts_every_walk() -> None:
     found = census(0)
-    assert len(found.walks) == PERIODS * len(closed_words(found.model, STOPS))
-    assert sum(found.words.values()) == len(found.walks)
+    assert len(found.walks) == PERIODS * len(closed_itineraries(found.model, STOPS))
+    assert sum(found.itineraries.values()) == len(found.walks)
     assert sum(walk.orbits for walk in found.walks) == len(found)
     assert {walk.fate for walk in found.walks if walk.orbits} == {Fate.FOUND}

@@ -19,7 +19,7 @@ from contfric.continuation.events import EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 SCENE = {"Omega": 0.55, "S": 0.32, "S0": 0.4}
 
@@ -104,7 +104,7 @@ def ends() -> tuple[cf.Branch, Vector, Vector]:
         for value in (float(branch.values[k]), float(branch.values[k]) + 1e-4):
             vector = branch.vector.copy()
             vector[0] = value
-            orbit = polish(replace(branch[k], vector=vector))
+            orbit = refine(replace(branch[k], vector=vector))
             joints = orbit.joints.copy()
             joints[:, 0] *= value
             points.append([*(arb(float(c)) for c in joints.ravel()), arb(value)])
@@ -135,7 +135,7 @@ def test_orbits_between_lie_in_the_box() -> None:
         value = float(first[-1]) + share * 1e-4
         vector = branch.vector.copy()
         vector[0] = value
-        orbit = polish(replace(branch[len(branch) // 2], vector=vector))
+        orbit = refine(replace(branch[len(branch) // 2], vector=vector))
         joints = orbit.joints.copy()
         joints[:, 0] *= value
         for ball, x in zip(box.all, [*joints.ravel(), value], strict=True):
@@ -161,7 +161,7 @@ def test_a_branch_beyond_its_end_is_not_proved() -> None:
     for value in values[::-1]:
         vector = branch.vector.copy()
         vector[0] = value
-        orbit = polish(replace(orbit, vector=vector))
+        orbit = refine(replace(orbit, vector=vector))
         assert orbit.converged
         joints.append(orbit.joints)
     beyond = replace(

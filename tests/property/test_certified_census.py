@@ -129,7 +129,7 @@ def test_the_orbits_are_those_of_the_search(omega: float) -> None:
     proved = cf.certify_census("coulomb", params)
     assert proved.proved, proved.why
     searched = cf.census("coulomb", params, periods=1, stops=6)
-    sticking = [o for o in searched if any(mode == "stick" for mode, _ in o.word)]
+    sticking = [o for o in searched if any(mode == "stick" for mode, _ in o.itinerary)]
     assert sorted(one.orbit.name for one in proved.orbits) == sorted(o.name for o in sticking)
     for one in proved.orbits:
         assert one.orbit.converged

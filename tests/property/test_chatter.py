@@ -159,7 +159,7 @@ def test_multipliers_of_chatter_by_differences_of_a_simulated_period(seed: int) 
     }
     orbit = cf.find_orbit("pounding", p)
     assert "chatter" in str(orbit.signature) and orbit.admissible
-    i = next(k for k, (mode, _) in enumerate(orbit.word) if mode == "free")
+    i = next(k for k, (mode, _) in enumerate(orbit.itinerary) if mode == "free")
     middle = 0.5 * (orbit.begins[i, 0] + orbit.ends[i, 0])
     state = orbit.flow.state(
         "free", orbit.begins[i, 0], orbit.begins[i, 1:], middle - orbit.begins[i, 0]
@@ -274,7 +274,7 @@ def test_a_forced_oscillator_rests_at_its_stop_on_either_side_of_a_section() -> 
     p = {"w": 0.25, "e": 0.4, "d": 0.2}
     orbit = cf.find_orbit("impact", p)
     assert orbit.admissible and np.all(orbit.multipliers == 0.0)
-    release = orbit.ends[[mode for mode, _ in orbit.word].index("chatter")]
+    release = orbit.ends[[mode for mode, _ in orbit.itinerary].index("chatter")]
     assert np.cos(0.25 * release[0]) == pytest.approx(0.2, abs=1e-12)  # A cos(w t) = k d
     assert release[1:] == pytest.approx([0.2, 0.0], abs=1e-12)
     assert str(orbit.signature).startswith("chatter -> down")
@@ -324,9 +324,9 @@ def test_a_pair_of_gears_rests_on_both_flanks(tmp_path: Path) -> None:
     path.write_text(GEAR, encoding="utf-8")
     orbit = cf.find_orbit(path, {})
     assert orbit.symmetric and orbit.admissible
-    kinds = [mode for mode, _ in orbit.word]
+    kinds = [mode for mode, _ in orbit.itinerary]
     assert sorted(kinds) == ["chatter_left", "chatter_right", "free", "free"]
-    for (mode, _), end in zip(orbit.word, orbit.ends, strict=True):
+    for (mode, _), end in zip(orbit.itinerary, orbit.ends, strict=True):
         if mode.startswith("chatter"):  # let go where the force changes its sign: cos(w t) = 0
             assert abs(np.cos(0.5 * end[0])) < 1e-12 and abs(end[2]) < 1e-13
     diagram = cf.explore(orbit, "w", (0.4, 0.6))
@@ -378,7 +378,9 @@ def test_flights_between_two_walls_of_one_observable(seed: int, tmp_path: Path) 
     assert walk.end is SimulationEnd.TIME
     period = 2.0 * np.pi / p["Om"]
     clock = walk.times + walk.cycles * period
-    rests = [k for k, (mode, _) in enumerate(walk.word) if mode.startswith("chatter") and k > 0]
+    rests = [
+        k for k, (mode, _) in enumerate(walk.itinerary) if mode.startswith("chatter") and k > 0
+    ]
     assert rests and np.max(np.abs(walk.states[:, 0])) < 0.5 + 1e-12
     # a simulation that is cut in the flights of a chatter goes on in them
     soon = [
@@ -389,7 +391,9 @@ def test_flights_between_two_walls_of_one_observable(seed: int, tmp_path: Path) 
         first = cf.simulate(model, p, state=[0.1, 0.0, 0.0], periods=cut / period, events=10**6)
         assert first.last[3].startswith("free")
         later = go_on(first, (clock[k] - cut) / period + 0.01)
-        again = next(i for i, (mode, _) in enumerate(later.word) if mode == walk.word[k][0])
+        again = next(
+            i for i, (mode, _) in enumerate(later.itinerary) if mode == walk.itinerary[k][0]
+        )
         own = later.times[again] + later.cycles[again] * period
         assert own % period == pytest.approx(clock[k] % period, abs=1e-9)
 

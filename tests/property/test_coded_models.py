@@ -233,7 +233,7 @@ def test_its_orbit_is_that_of_the_equations(three: cf.Model) -> None:
     orbit = cf.find_orbit(three, three.defaults)
     evaluator_fields = {m.name: m.field for m in from_text(three.definition).modes}
     names = from_text(three.definition).names
-    for i, (mode, _) in enumerate(orbit.word):
+    for i, (mode, _) in enumerate(orbit.itinerary):
         (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
 
         def rates(t: float, y: Any, mode: str = mode) -> list[float]:
@@ -243,7 +243,7 @@ def test_its_orbit_is_that_of_the_equations(three: cf.Model) -> None:
 
         found = solve_ivp(rates, (t0, t1), start, rtol=1e-11, atol=1e-12)
         assert np.max(np.abs(found.y[:, -1] - end)) < 1e-8
-    assert len({mode for mode, _ in orbit.word}) >= 6
+    assert len({mode for mode, _ in orbit.itinerary}) >= 6
 
 
 # --------------------------------------------------------------------------------------- rules

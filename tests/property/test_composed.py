@@ -85,11 +85,11 @@ def test_solutions_are_those_of_listed_modes(composing: Any, seed: int) -> None:
     one, other = (cf.simulate(m, state=state, periods=12) for m in (listed, composed))
     # a listed model is cut where an orbit may stay in a mode, too, with a name for each part
     apart = ("sssso", "weak"), ("sssso-", "weak")
-    cuts = [k for k, pair in enumerate(one.word) if pair not in apart and pair[1] != "phase"]
-    word = [(one.word[k][0].rstrip("-"), one.word[k][1]) for k in cuts]
-    assert len(word) > 20 and tuple(word) == other.word
+    cuts = [k for k, pair in enumerate(one.itinerary) if pair not in apart and pair[1] != "phase"]
+    itinerary = [(one.itinerary[k][0].rstrip("-"), one.itinerary[k][1]) for k in cuts]
+    assert len(itinerary) > 20 and tuple(itinerary) == other.itinerary
     np.testing.assert_allclose(one.states[cuts], other.states, atol=1e-9)
-    assert len(composed.modes) <= len({mode for mode, _ in other.word}) + 1
+    assert len(composed.modes) <= len({mode for mode, _ in other.itinerary}) + 1
 
 
 def test_a_branch_ends_where_that_of_listed_modes_does(composing: Any) -> None:
@@ -100,7 +100,7 @@ def test_a_branch_ends_where_that_of_listed_modes_does(composing: Any) -> None:
         events = [(b.kind, b.params["Omega"]) for b in branch.bifurcations if b.kind != "T"]
         found.append((orbit, sorted(events, key=lambda event: event[1])))
     (one, events), (other, same) = found
-    assert one.word == other.word and one.symmetric == other.symmetric
+    assert one.itinerary == other.itinerary and one.symmetric == other.symmetric
     np.testing.assert_allclose(
         np.sort(np.abs(one.multipliers)), np.sort(np.abs(other.multipliers)), atol=1e-9
     )
@@ -121,7 +121,10 @@ def test_a_diagram_goes_on_where_contacts_change_in_another_order() -> None:
         joint = orbit.ends[-1]
         again = cf.find_orbit(model, orbit.params, state=joint[1:], time=float(joint[0]))
         assert abs(again.x_max - orbit.x_max) < 1e-8
-        assert sorted(again.word) in (sorted(orbit.word), sorted(orbit.mirror().word))
+        assert sorted(again.itinerary) in (
+            sorted(orbit.itinerary),
+            sorted(orbit.mirror().itinerary),
+        )
 
 
 def test_nothing_is_listed() -> None:
@@ -144,7 +147,7 @@ def test_a_saved_orbit_comes_back_in_a_model_that_has_visited_nothing(tmp_path: 
     cf.save(orbit, tmp_path / "orbit.npz")
     model_of.cache_clear()
     again = cf.load(tmp_path / "orbit.npz")
-    assert again.model is not orbit.model and again.word == orbit.word
+    assert again.model is not orbit.model and again.itinerary == orbit.itinerary
     np.testing.assert_allclose(again.joints, orbit.joints, atol=1e-12)
     assert again.signature.segments == orbit.signature.segments
 

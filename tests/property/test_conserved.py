@@ -69,12 +69,12 @@ def test_a_branch_keeps_the_datum() -> None:
     assert not kinds & {cf.Kind.SN, cf.Kind.BP, cf.Kind.PD}
 
 
-def test_what_a_word_conserves() -> None:
+def test_what_a_itinerary_conserves() -> None:
     model = two_masses()
-    word = (("ps", "c1"), ("ns", "c1"))
-    (direction,) = conserved(model, word)
+    itinerary = (("ps", "c1"), ("ns", "c1"))
+    (direction,) = conserved(model, itinerary)
     assert np.abs(direction) == pytest.approx([0.0, 1.0, 0.0, 0.0], abs=1e-9)
-    assert conserved(model, (*word, ("np", "c2"))).shape == (0, 4)
+    assert conserved(model, (*itinerary, ("np", "c2"))).shape == (0, 4)
     assert conserved(cf.load_model("coulomb"), (("slide+", "v"),)).shape == (0, 2)
     mirror = -np.eye(4)
     assert kept_by(mirror, direction[None, :]).shape == (0, 4)

@@ -26,7 +26,7 @@ def diagram() -> cf.Diagram:
 
 def test_chain_of_signatures_is_found_by_exploring() -> None:
     """4 segments (rest in the band's edges), 6 (beyond it, then rest), 4 (beyond it, no rest)."""
-    lengths = [2 * len(branch.system.word) for branch in diagram().branches]
+    lengths = [2 * len(branch.system.itinerary) for branch in diagram().branches]
     order = np.argsort([-branch.values.mean() for branch in diagram().branches])
     rests = [branch[0].signature.stops for branch in diagram().branches]
     assert sorted(zip([lengths[i] for i in order], [rests[i] for i in order], strict=True)) == [
@@ -45,7 +45,7 @@ def test_ends_say_that_the_motion_is_continuous() -> None:
 
 @pytest.mark.parametrize("beside", [-1e-3, 1e-3])
 def test_events_by_simulation_on_both_sides(beside: float) -> None:
-    """The words near each event are those of the branches that meet there."""
+    """The itineraries near each event are those of the branches that meet there."""
     checked = 0
     for node in diagram().nodes:
         b = node.bifurcation
@@ -53,8 +53,8 @@ def test_events_by_simulation_on_both_sides(beside: float) -> None:
             continue
         params = {**b.params, "S": b.params["S"] + beside}
         found = cf.find_orbit(dead_band, params)
-        words = {frozenset(diagram().branches[i][0].word) for i in node.branches}
-        assert frozenset(found.word) in words
+        itineraries = {frozenset(diagram().branches[i][0].itinerary) for i in node.branches}
+        assert frozenset(found.itinerary) in itineraries
         checked += 1
     assert checked == 2
 
@@ -95,7 +95,7 @@ def test_multiplier_agrees_with_differences() -> None:
             domain=found.trajectory(8)[2][1],
             periods=1.2 * found.period,
         )
-        at = [k for k, pair in enumerate(walked.word) if pair == found.word[-1]]
+        at = [k for k, pair in enumerate(walked.itinerary) if pair == found.itinerary[-1]]
         return float(walked.states[at[0], 0])
 
     brute = (mapped(exit_[1] + h) - mapped(exit_[1] - h)) / (2 * h)

@@ -90,11 +90,11 @@ def test_a_cycle_between_a_point_and_a_node_on_the_surface(seed: int, tmp_path: 
 def test_a_cycle_run_through_several_times_is_one_cycle(turns: int, tmp_path: Path) -> None:
     orbit = cf.find_orbit(mckean(tmp_path, 0.25, 0.5, 0.1)[0])
     joints = np.concatenate([orbit.joints for _ in range(turns)])
-    joints[:, 0] -= np.repeat(np.arange(turns)[::-1], len(orbit.word)) * orbit.period
+    joints[:, 0] -= np.repeat(np.arange(turns)[::-1], len(orbit.itinerary)) * orbit.period
     for periods in (1, turns):
-        system = build_system(orbit.model, orbit.word * turns, periods)
+        system = build_system(orbit.model, orbit.itinerary * turns, periods)
         once = shortest(replace(orbit, system=system, joints=joints))
-        assert once.word == orbit.word and once.periods == 1
+        assert once.itinerary == orbit.itinerary and once.periods == 1
         assert once.joints == pytest.approx(orbit.joints, abs=1e-12)
 
 

@@ -81,7 +81,7 @@ def test_a_contact_that_creeps_ends_at_the_limit_of_its_load(force: float) -> No
     model = random_structure(0, "ff")
     orbit = cf.find_orbit(model, {"F": force}, state=[-0.13, 0.065, 0.0, 0.0])
     assert orbit.admissible
-    assert {surface for _, surface in orbit.word} == {"a", "a+", "a-"}
+    assert {surface for _, surface in orbit.itinerary} == {"a", "a+", "a-"}
     draw = np.random.default_rng([0, 4])
     draw.uniform(size=3)  # the springs
     limit = float(random_contacts(draw, "ff")["b"]["kinetic"][:-2])
@@ -103,7 +103,7 @@ def test_a_contact_that_sticks_for_good_does_not_end_a_diagram() -> None:
     assert places["a",] == pytest.approx(law["a"], abs=1e-9)
     stuck = next(b for b in found.branches if abs(b.values.max() - places["b",]) < 1e-9)
     orbit = stuck[int(np.argmax(stuck.values))]
-    assert all(mode[1] == "s" for mode, _ in orbit.word)
+    assert all(mode[1] == "s" for mode, _ in orbit.itinerary)
     assert orbit.quantity("max(abs(force(b)))") == pytest.approx(law["b"], abs=1e-8)
 
 

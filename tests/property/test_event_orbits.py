@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.words import decode
+from contfric.orbit.itineraries import decode
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 SCENES = {
@@ -52,7 +52,7 @@ def test_mirror_branches_carry_their_own_margins_and_labels(parameter: str) -> N
             finite = np.isfinite(orbit.margins)
             assert np.allclose(branch.margins[i][finite], orbit.margins[finite], atol=1e-9)
             passed = [d for code in branch.labels[i] for d in decode(int(code), ["F+", "F-", "v"])]
-            count = len(branch.system.word) + len(passed)  # each crossing is one segment more
+            count = len(branch.system.itinerary) + len(passed)  # each crossing is one segment more
             if all(
                 orbit.ends[:, 0] > orbit.cycle[:, 0] + 1e-6
             ):  # of a slide that vanishes: rounding

@@ -145,7 +145,7 @@ def test_every_sample_has_the_domain_of_its_segment(seed: int) -> None:
     assert table["domain"][0] == orbit.signature.segments[0]
     modes = {d.name: d.mode for d in orbit.model.domains}
     starts = np.searchsorted(times, orbit.cycle[:, 0], side="right") - 1
-    assert [modes[names[k]] for k in starts] == [mode for mode, _ in orbit.word]
+    assert [modes[names[k]] for k in starts] == [mode for mode, _ in orbit.itinerary]
 
 
 def test_the_first_sample_of_1a_is_beyond_the_limit_it_was_released_at() -> None:

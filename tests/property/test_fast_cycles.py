@@ -57,5 +57,5 @@ def test_a_surface_may_be_the_zero_of_an_expression(tmp_path: Path) -> None:
     """The observable then has the name of the surface."""
     model = welander(tmp_path, 1.0, 0.8, 0.5, 1.0, -0.02)
     orbit = cf.find_orbit(model, {})
-    assert orbit.word[0][1] == "density"
+    assert orbit.itinerary[0][1] == "density"
     assert orbit.quantity("max(density)") > -0.02 > orbit.quantity("min(density)")

@@ -259,7 +259,7 @@ def test_one_event_has_one_name_where_nothing_jumps() -> None:
 def test_a_surface_far_away_is_found_by_a_simulation() -> None:
     """A stick of hundreds of units of time ends where the spring is as strong as friction."""
     orbit = cf.find_orbit("belt", {"vb": 0.005})
-    (i,) = [k for k, (mode, _) in enumerate(orbit.word) if mode == "stick"]
+    (i,) = [k for k, (mode, _) in enumerate(orbit.itinerary) if mode == "stick"]
     begin, end = orbit.begins[i], orbit.ends[i]
     assert end[1] == pytest.approx(1.0, abs=1e-12)
     assert end[0] - begin[0] == pytest.approx((1.0 - begin[1]) / 0.005, rel=1e-12)

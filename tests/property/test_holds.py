@@ -1,4 +1,4 @@
-"""Holds: their notation, the edits that put them into words, and the equations of orbits with them."""
+"""Holds: their notation, the edits that put them into itineraries, and the equations of orbits with them."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from contfric.models import load_model
 from contfric.orbit.linear import assembled, jacobian_blocks, tangent_of
 from contfric.orbit.samples import state_within
 from contfric.signature import (
-    canonical_word,
+    canonical_itinerary,
     double,
     is_closed_walk,
-    mirror_word,
+    mirror_itinerary,
     parse_signature,
-    reduced_word,
+    reduced_itinerary,
 )
 from contfric.signature.edits import Edit, apply_edit, concatenate, drop, insert, split
 from contfric.signature.holds import TOUCH, departing_mode, hold_at, is_hold, without_holds
@@ -52,8 +52,8 @@ def test_notation_round_trip(kind: str) -> None:
     for k in range(len(signature.segments)):
         turned = signature.rotate(k)
         assert turned == signature and hash(turned) == hash(signature)
-        assert canonical_word(reduced_word(turned), COULOMB) == canonical_word(
-            reduced_word(signature), COULOMB
+        assert canonical_itinerary(reduced_itinerary(turned), COULOMB) == canonical_itinerary(
+            reduced_itinerary(signature), COULOMB
         )
 
 
@@ -65,7 +65,7 @@ def test_mirror_of_a_hold(kind: str) -> None:
     assert image.mirror() == signature
     assert ("hold@F-" in image.segments) == (kind == "SS")
     assert (TOUCH in image.segments) == (kind != "SS")
-    assert reduced_word(image) == mirror_word(reduced_word(signature), COULOMB)
+    assert reduced_itinerary(image) == mirror_itinerary(reduced_itinerary(signature), COULOMB)
 
 
 def test_two_mirrored_holds_are_symmetric() -> None:
@@ -103,8 +103,8 @@ def test_faults_say_what_is_wrong(text: str, message: str) -> None:
 
 
 @st.composite
-def words(draw: st.DrawFn) -> tuple[tuple[str, str], ...]:
-    """A closed word of the oscillator: each stop is a reversal or a stick that goes on either way."""
+def itineraries(draw: st.DrawFn) -> tuple[tuple[str, str], ...]:
+    """A closed itinerary of the oscillator: each stop is a reversal or a stick that goes on either way."""
     segments: list[tuple[str, str]] = []
     direction = "+"
     for _ in range(draw(st.integers(1, 6))):
@@ -119,41 +119,41 @@ def words(draw: st.DrawFn) -> tuple[tuple[str, str], ...]:
     return tuple(segments)
 
 
-def reversals(word: tuple[tuple[str, str], ...]) -> list[int]:
+def reversals(itinerary: tuple[tuple[str, str], ...]) -> list[int]:
     return [
         i
-        for i, (mode, _) in enumerate(word)
-        if mode != "stick" and word[(i + 1) % len(word)][0] not in ("stick", mode)
+        for i, (mode, _) in enumerate(itinerary)
+        if mode != "stick" and itinerary[(i + 1) % len(itinerary)][0] not in ("stick", mode)
     ]
 
 
-def held(word: tuple[tuple[str, str], ...], i: int) -> Edit:
+def held(itinerary: tuple[tuple[str, str], ...], i: int) -> Edit:
     """A hold at the reversal behind slide i."""
-    return insert(i, ("stick", hold_at("F+" if word[i][0] == "slide+" else "F-")))
+    return insert(i, ("stick", hold_at("F+" if itinerary[i][0] == "slide+" else "F-")))
 
 
 def same(one: object, other: object) -> bool:
-    return canonical_word(one, COULOMB) == canonical_word(other, COULOMB)  # type: ignore[arg-type]
+    return canonical_itinerary(one, COULOMB) == canonical_itinerary(other, COULOMB)  # type: ignore[arg-type]
 
 
-@given(words(), st.data())
-def test_edits_stay_closed_walks_and_can_be_undone(word, data) -> None:  # type: ignore[no-untyped-def]
-    places = reversals(word)
+@given(itineraries(), st.data())
+def test_edits_stay_closed_walks_and_can_be_undone(itinerary, data) -> None:  # type: ignore[no-untyped-def]
+    places = reversals(itinerary)
     assume(places)
     chosen = data.draw(st.lists(st.sampled_from(places), min_size=1, unique=True))
     edit = Edit()
     for i in chosen:
-        edit |= held(word, i)
-    edited = apply_edit(word, edit, COULOMB)
-    assert len(edited) == len(word) + len(chosen)
+        edit |= held(itinerary, i)
+    edited = apply_edit(itinerary, edit, COULOMB)
+    assert len(edited) == len(itinerary) + len(chosen)
     assert is_closed_walk(edited, COULOMB)
     assert is_closed_walk(double(edited), COULOMB)
     assert is_closed_walk(concatenate(edited, edited, edited), COULOMB)
-    assert is_closed_walk(mirror_word(edited, COULOMB), COULOMB)
-    assert same(mirror_word(mirror_word(edited, COULOMB), COULOMB), edited)
+    assert is_closed_walk(mirror_itinerary(edited, COULOMB), COULOMB)
+    assert same(mirror_itinerary(mirror_itinerary(edited, COULOMB), COULOMB), edited)
     holds = [i for i, (_, exit_) in enumerate(edited) if is_hold(exit_)]
     assert len(holds) == len(chosen)
-    assert apply_edit(edited, drop(*holds), COULOMB) == word
+    assert apply_edit(edited, drop(*holds), COULOMB) == itinerary
     regular = without_holds(edited, COULOMB)
     assert not any(is_hold(exit_) for _, exit_ in regular)
     assert is_closed_walk(regular, COULOMB)
@@ -161,33 +161,35 @@ def test_edits_stay_closed_walks_and_can_be_undone(word, data) -> None:  # type:
         assert edited[(i + 1) % len(edited)][0] == departing_mode(COULOMB, edited[i - 1], edited[i])
 
 
-@given(words(), st.data())
-def test_a_slide_and_a_stick_can_be_split_at_a_touch(word, data) -> None:  # type: ignore[no-untyped-def]
-    i = data.draw(st.integers(0, len(word) - 1))
-    mode, exit_ = word[i]
+@given(itineraries(), st.data())
+def test_a_slide_and_a_stick_can_be_split_at_a_touch(itinerary, data) -> None:  # type: ignore[no-untyped-def]
+    i = data.draw(st.integers(0, len(itinerary) - 1))
+    mode, exit_ = itinerary[i]
     if mode == "stick":
-        edited = apply_edit(word, split(i, exit_, ("stick", TOUCH)), COULOMB)
+        edited = apply_edit(itinerary, split(i, exit_, ("stick", TOUCH)), COULOMB)
     else:
-        edited = apply_edit(word, split(i, "v", ("stick", TOUCH), (mode, exit_)), COULOMB)
+        edited = apply_edit(itinerary, split(i, "v", ("stick", TOUCH), (mode, exit_)), COULOMB)
     assert is_closed_walk(double(edited), COULOMB)
     k = next(k for k, pair in enumerate(edited) if pair[1] == TOUCH)
     if mode == "stick":
-        assert apply_edit(edited, drop(k), COULOMB) == word
+        assert apply_edit(edited, drop(k), COULOMB) == itinerary
     else:
         joined = Edit(frozenset({k, (k + 1) % len(edited)}), {k - 1: exit_})
-        assert apply_edit(edited, joined, COULOMB) == word
+        assert apply_edit(edited, joined, COULOMB) == itinerary
 
 
-@given(words(), st.data())
-def test_what_the_graph_forbids_is_refused(word, data) -> None:  # type: ignore[no-untyped-def]
-    places = reversals(word)
+@given(itineraries(), st.data())
+def test_what_the_graph_forbids_is_refused(itinerary, data) -> None:  # type: ignore[no-untyped-def]
+    places = reversals(itinerary)
     assume(places)
     i = data.draw(st.sampled_from(places))
-    other = "F-" if word[i][0] == "slide+" else "F+"
+    other = "F-" if itinerary[i][0] == "slide+" else "F+"
     with pytest.raises(NotationError, match="two edits change segment"):
-        held(word, i) | held(word, i)
+        held(itinerary, i) | held(itinerary, i)
     with pytest.raises(NotationError, match="cannot become"):
-        apply_edit(word, insert(i, ("stick", other)), COULOMB)  # released to where it came from
+        apply_edit(
+            itinerary, insert(i, ("stick", other)), COULOMB
+        )  # released to where it came from
 
 
 # ------------------------------------------------------------------------------- equations
@@ -313,12 +315,12 @@ def test_the_unit_of_a_doubled_orbit_is_that_of_the_orbit(index: int) -> None:
     unit, doubled = unit_of(orbit.as_whole()), unit_of(orbit.doubled())
     assert unit.periods == doubled.periods == orbit.periods
     assert unit.half == doubled.half == orbit.symmetric
-    twice, still = orbit.doubled(), np.zeros(len(orbit.word) * 2)
+    twice, still = orbit.doubled(), np.zeros(len(orbit.itinerary) * 2)
     copies = pieces(twice, doubled)
     assert len(copies) == (4 if orbit.symmetric else 2)
     for copy in copies:
         again = form_of(twice, still, doubled, copy, "").orbit.as_whole()
-        assert same(again.word, orbit.word)
+        assert same(again.itinerary, orbit.itinerary)
         assert np.allclose(np.sort(again.stops), np.sort(orbit.stops), rtol=0, atol=1e-12)
 
 
@@ -359,7 +361,7 @@ def test_saved_and_loaded(index: int, tmp_path: Path) -> None:
     again = cf.load(tmp_path / "orbit.npz")
     assert again.signature == orbit.signature
     assert again.signature.holds == orbit.signature.holds > 0
-    assert again.system.word == orbit.system.word and again.periods == orbit.periods
+    assert again.system.itinerary == orbit.system.itinerary and again.periods == orbit.periods
     assert again.system.holds == orbit.system.holds
     assert np.array_equal(again.joints, orbit.joints)
     assert np.array_equal(again.margins, orbit.margins)

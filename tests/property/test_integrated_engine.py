@@ -30,8 +30,8 @@ def facts(branch: cf.Branch) -> tuple[object, ...]:
     # in the middle: at an event itself rounding decides on which side of a surface a joint is
     middle = branch[len(branch) // 2]
     return (
-        len(middle.word),
-        sorted(map(str, middle.word)),
+        len(middle.itinerary),
+        sorted(map(str, middle.itinerary)),
         sorted(e.reason.name for e in branch.ends),
     )
 

@@ -30,7 +30,7 @@ def allowed(alpha: float, beta: float, longest: int = LONGEST) -> dict[str, tupl
 
 
 def window(turns: str, alpha: float, beta: float) -> tuple[float, float]:
-    """Return the x between which all points of a word are on their sides: they are linear in x."""
+    """Return the x between which all points of an itinerary are on their sides: they are linear in x."""
     count = len(turns)
     slopes = np.array([alpha if letter == "a" else beta for letter in turns])
     shift = np.eye(count)[:, [*range(1, count), 0]] * 1.0  # point k + 1 follows point k
@@ -48,12 +48,12 @@ def window(turns: str, alpha: float, beta: float) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_every_word_of_a_linear_map_with_a_window_is_allowed_there(seed: int) -> None:
-    """Whatever the signs of the slopes, up to expanding words."""
+def test_every_itinerary_of_a_linear_map_with_a_window_is_allowed_there(seed: int) -> None:
+    """Whatever the signs of the slopes, up to expanding itineraries."""
     alpha, beta = np.random.default_rng(seed).uniform(-0.9, 0.9, 2)
     found = allowed(alpha, beta)
     count = 0
-    for turns in itineraries._all_words(LONGEST):
+    for turns in itineraries._all_itineraries(LONGEST):
         low, high = window(turns, alpha, beta)
         if low < high:
             count += 1
@@ -64,13 +64,13 @@ def test_every_word_of_a_linear_map_with_a_window_is_allowed_there(seed: int) ->
     )
 
 
-def test_a_map_with_a_gap_has_one_word_for_each_fraction() -> None:
-    """Both branches increase: the words of the Farey tree, phi(n) of n turns."""
+def test_a_map_with_a_gap_has_one_itinerary_for_each_fraction() -> None:
+    """Both branches increase: the itineraries of the Farey tree, phi(n) of n turns."""
     found = allowed(0.5, 0.5)
     for length in range(2, LONGEST + 1):
-        words = [turns for turns in found if len(turns) == length]
-        assert len(words) == sum(gcd(k, length) == 1 for k in range(1, length))
-        assert sorted(turns.count("b") for turns in words) == [
+        itineraries = [turns for turns in found if len(turns) == length]
+        assert len(itineraries) == sum(gcd(k, length) == 1 for k in range(1, length))
+        assert sorted(turns.count("b") for turns in itineraries) == [
             k for k in range(1, length) if gcd(k, length) == 1
         ]
 
@@ -84,10 +84,10 @@ SCENES = [
 
 
 @pytest.mark.parametrize("params", SCENES)
-def test_words_that_are_left_out_have_no_window(
+def test_itineraries_that_are_left_out_have_no_window(
     params: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All words are tried if the map cannot be sampled: the windows are the same, to the last bit."""
+    """All itineraries are tried if the map cannot be sampled: the windows are the same, to the last bit."""
     found = cf.explore(cf.find_orbit("coulomb", {"Omega": 0.5, **params}), "Omega", (0.45, 0.56))
     bridge = next(b for b in found.branches if b.bridge and not b.mirrored)
     maps = []

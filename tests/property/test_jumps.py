@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.starts import signs_at
 
 #: For each kind a scene in which a stable regular branch ends at it.
@@ -41,7 +41,7 @@ def test_without_bridges_the_jumps_are_loose_ends(kind: str) -> None:
 def start_domain(orbit: cf.Orbit) -> str:
     """The domain in which the first segment of the whole orbit starts."""
     t, *y = orbit.cycle[0]
-    mode, signs = orbit.word[0][0], signs_at(orbit.model, t, np.array(y), orbit.vector)
+    mode, signs = orbit.itinerary[0][0], signs_at(orbit.model, t, np.array(y), orbit.vector)
     return next(
         d.name
         for d in orbit.model.domains
@@ -60,7 +60,7 @@ def stable_end(found: cf.Diagram, kind: str) -> tuple[cf.Branch, int]:
 
 
 def beside(branch: cf.Branch, side: int, share: float) -> cf.Orbit:
-    """The orbit of the branch's word beside an end: inside if positive, beyond it if negative.
+    """The orbit of the branch's itinerary beside an end: inside if positive, beyond it if negative.
 
     Beyond a stop that has become tangential (GS) the equations have no solution: the tip itself there.
     """
@@ -69,7 +69,7 @@ def beside(branch: cf.Branch, side: int, share: float) -> cf.Orbit:
     width = abs(branch.values[-1] - branch.values[0])
     vector = tip.vector.copy()
     vector[branch.model.index_of(branch.parameter)] = event + inward * share * width
-    solved = polish(cf.Orbit(branch.system, tip.joints, vector, np.inf))
+    solved = refine(cf.Orbit(branch.system, tip.joints, vector, np.inf))
     assert solved.converged or share < 0.0
     return solved if solved.converged else replace(solved, joints=tip.joints)
 
@@ -85,7 +85,7 @@ def leaves(orbit: cf.Orbit, periods: int = 400) -> float:
         periods=periods,
         domain=start_domain(orbit),
     )
-    stops = path.states[[exit_ == "v" for _, exit_ in path.word], 0]
+    stops = path.states[[exit_ == "v" for _, exit_ in path.itinerary], 0]
     return float(np.max(np.min(np.abs(stops[:, None] - orbit.stops[None, :]), axis=1)))
 
 

@@ -350,13 +350,13 @@ def test_a_mass_without_restitution_leaves_a_wall_that_it_is_pulled_from() -> No
         period="2*pi/w",
     )
     found = cf.simulate(model, {}, state=[-1.0, 0.0], periods=0.9)
-    t = float(found.times[[exit_ for _, exit_ in found.word].index("wall")])
+    t = float(found.times[[exit_ for _, exit_ in found.itinerary].index("wall")])
     ended = cf.simulate(model, {}, state=[-1.0, 0.0], periods=(t + 1.0) / (4.0 * np.pi))
     forced = 0.1 / 0.75  # x = forced cos(t/2) + a cos(t - t0) + b sin(t - t0)
     a, b = 0.5 - forced * np.cos(0.5 * t), 0.5 * forced * np.sin(0.5 * t)
     x = forced * np.cos(0.5 * (t + 1.0)) + a * np.cos(1.0) + b * np.sin(1.0)
     assert ended.last[2][0] == pytest.approx(x, abs=1e-12)
-    assert [exit_ for _, exit_ in ended.word].count("wall") == 1
+    assert [exit_ for _, exit_ in ended.itinerary].count("wall") == 1
 
 
 def test_contacts_that_share_their_load_and_too_many_are_refused() -> None:

@@ -77,7 +77,7 @@ def test_a_spring_that_is_only_touched_changes_no_multiplier(size: int, seed: in
     event = next(b for b in found.bifurcations if b.kind is cf.Kind.GS)
     assert event.params["d"] == pytest.approx(amplitude, rel=1e-9)
     ends = at_grazing(found, "d", event.params["d"])
-    assert any("c" in mode for orbit in ends for mode, _ in orbit.system.word)
+    assert any("c" in mode for orbit in ends for mode, _ in orbit.system.itinerary)
     for orbit in ends:
         assert_same_set(orbit.multipliers, start.multipliers, 1e-9)
 
@@ -99,7 +99,7 @@ def test_a_slider_that_only_touches_its_limit_has_the_limit_of_those_that_slip(s
     )
     found = cf.explore(cf.find_orbit(model, {}), "F", (0.2, 1.6), max_periods=1)
     event = next(b for b in found.bifurcations if b.kind in (cf.Kind.GS, cf.Kind.CS))
-    slips = next(b for b in found.branches if any(m in "pn" for m, _ in b[0].system.word))
+    slips = next(b for b in found.branches if any(m in "pn" for m, _ in b[0].system.itinerary))
     first = event.params["F"]
     distances = (1e-4, 1e-5)
     found_at = []
@@ -112,7 +112,9 @@ def test_a_slider_that_only_touches_its_limit_has_the_limit_of_those_that_slip(s
         assert branch.params["F"][low] == pytest.approx(first + distance, abs=1e-10)
         found_at.append(np.sort_complex(branch[low].multipliers))
     far, near = found_at
-    ends = [o for o in at_grazing(found, "F", first) if any(m in "pn" for m, _ in o.system.word)]
+    ends = [
+        o for o in at_grazing(found, "F", first) if any(m in "pn" for m, _ in o.system.itinerary)
+    ]
     assert ends
     for orbit in ends:  # with the root of the distance
         limit = near + (near - far) / (np.sqrt(distances[0] / distances[1]) - 1.0)
@@ -128,6 +130,6 @@ def test_a_cycle_that_only_touches_a_spring_has_the_multiplier_of_the_free_one(
     found = cf.explore(start, "d", (1.95, 2.1), max_periods=1)
     event = next(b for b in found.bifurcations if b.kind is cf.Kind.GS)
     ends = at_grazing(found, "d", event.params["d"])
-    assert len({orbit.system.word for orbit in ends}) >= 2
+    assert len({orbit.system.itinerary for orbit in ends}) >= 2
     for orbit in ends:
         assert orbit.multipliers == pytest.approx(start.multipliers, abs=1e-9)

@@ -1,9 +1,9 @@
 """Every orbit of whole diagrams, handed to the simulator: it comes back, with the same signature.
 
 The simulation shares the flow with the boundary-value problem, but neither its equations, nor the
-order of its segments, nor its joints: the word is found anew, event by event. An unstable orbit
+order of its segments, nor its joints: the itinerary is found anew, event by event. An unstable orbit
 multiplies what rounding there is in its initial state by its multiplier mu, so the tolerance is
-1e-11 * max(1, |mu|). The two end points of a branch lie on an event, where the word is ambiguous, and
+1e-11 * max(1, |mu|). The two end points of a branch lie on an event, where the itinerary is ambiguous, and
 are left out.
 """
 
@@ -57,7 +57,7 @@ def orbits(name: str, every: int = 1) -> Iterator[cf.Orbit]:
 def section(orbit: cf.Orbit) -> tuple[int, float]:
     """(segment, time) inside the longest slide, away from its ends."""
     spans = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    slides = [k for k, (mode, _) in enumerate(orbit.word) if mode != "stick"]
+    slides = [k for k, (mode, _) in enumerate(orbit.itinerary) if mode != "stick"]
     longest = max(slides, key=lambda k: spans[k])
     return longest, float(orbit.cycle[longest, 0] + 0.4 * spans[longest])
 
@@ -69,7 +69,7 @@ def turn(orbit: cf.Orbit, time: float, state: np.ndarray) -> cf.orbit.simulation
 
 
 @each_diagram
-def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
+def test_every_orbit_reproduces_itself_and_its_itinerary(name: str) -> None:
     """Measured: 2e-14 at worst, 8e-12 |mu| near an event at which the flow jumps (in h).
 
     Where an exit is met almost tangentially, with a rate r, its time is good to rounding / r only:
@@ -86,7 +86,7 @@ def test_every_orbit_reproduces_itself_and_its_word(name: str) -> None:
         exits = [t.margin.value == "exit" for t in orbit.system.tests]
         rate = min(1.0, float(np.min(orbit.margins[exits])))
         assert gap < max(1e-11, 1e-13 / rate) * max(1.0, mu), (orbit, gap, mu, rate)
-        assert run.word == rotated(orbit.word, first), orbit
+        assert run.itinerary == rotated(orbit.itinerary, first), orbit
         assert orbit.admissible, orbit.violations()
         count += 1
     assert count > 50
@@ -160,7 +160,7 @@ def test_multipliers_are_those_of_the_simulated_return_map(name: str) -> None:
         # rounding 1e-15 / 1e-6, and the third derivative of the map times 1e-12
         assert abs(np.trace(slope) - np.sum(mu)) < 1e-6 * size, orbit
         assert abs(np.linalg.det(slope) - np.prod(mu)) < 1e-6 * size**2, orbit
-        if any(mode == "stick" for mode, _ in orbit.word):
+        if any(mode == "stick" for mode, _ in orbit.itinerary):
             assert mu[1] == 0.0, "a stick forgets where it came from"
         count += 1
     assert count > 5
@@ -185,6 +185,6 @@ def test_full_form_is_the_same_orbit(name: str) -> None:
         assert abs(np.sum(full.multipliers) - np.sum(orbit.multipliers)) < 100 * limit * size
         assert abs(np.prod(full.multipliers) - np.prod(orbit.multipliers)) < 100 * limit * size
         assert full.system.segments == len(orbit.signature.segments)
-        longer += full.system.segments > len(orbit.word)
+        longer += full.system.segments > len(orbit.itinerary)
         count += 1
     assert count > 5 and longer > count / 2

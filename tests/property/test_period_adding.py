@@ -25,8 +25,8 @@ def windows() -> tuple[cf.Window, ...]:
 
 
 def test_the_windows_in_order() -> None:
-    """Between two neighbours stands the word of both, as in a Farey tree; then one turn of 1a more."""
-    assert [w.word for w in windows()] == [
+    """Between two neighbours stands the itinerary of both, as in a Farey tree; then one turn of 1a more."""
+    assert [w.itinerary for w in windows()] == [
         "1a-2a-2a",
         "1a-2a-1a-2a-2a",
         "1a-2a",
@@ -43,7 +43,7 @@ def test_the_windows_in_order() -> None:
 
 
 @pytest.mark.slow
-def test_every_simulation_in_the_gap_settles_on_a_word_of_the_list_or_a_longer_one() -> None:
+def test_every_simulation_in_the_gap_settles_on_a_itinerary_of_the_list_or_a_longer_one() -> None:
     known = {identity(w.branch[0]) for w in windows()}
     for value in np.linspace(0.4917489, 0.4918166, 40):
         orbit = cf.find_orbit("coulomb", {**PARAMS, "Omega": float(value)})
@@ -52,7 +52,7 @@ def test_every_simulation_in_the_gap_settles_on_a_word_of_the_list_or_a_longer_o
 
 
 @pytest.mark.parametrize("index", range(7))
-def test_simulation_settles_on_the_word(index: int) -> None:
+def test_simulation_settles_on_the_itinerary(index: int) -> None:
     """From near the orbit: windows overlap a little, and two attractors have their basins there."""
     window = windows()[index]
     low, high = window.range
@@ -68,7 +68,7 @@ def test_simulation_settles_on_the_word(index: int) -> None:
 
 @pytest.mark.parametrize("index", range(7))
 def test_a_window_ends_where_a_stop_meets_the_surface(index: int) -> None:
-    """Just outside of the window the simulation leaves the word within its period."""
+    """Just outside of the window the simulation leaves the itinerary within its period."""
     window = windows()[index]
     for end, side in zip(window.branch.ends, (0, -1), strict=True):
         assert end.reason is cf.EndReason.SS
@@ -80,10 +80,12 @@ def test_a_window_ends_where_a_stop_meets_the_surface(index: int) -> None:
             run = cf.simulate(
                 "coulomb", params, state=tip.state(0.3), time=0.3, periods=16.0 * tip.periods
             )
-            count = len(tip.word)
-            word = run.word[-12 * count :]
-            repeats = all(word[k] == word[k + count] for k in range(len(word) - count))
-            same = repeats and sorted(word[:count]) == sorted(tip.word)
+            count = len(tip.itinerary)
+            itinerary = run.itinerary[-12 * count :]
+            repeats = all(
+                itinerary[k] == itinerary[k + count] for k in range(len(itinerary) - count)
+            )
+            same = repeats and sorted(itinerary[:count]) == sorted(tip.itinerary)
             assert same is follows, (window, side, step)
 
 

@@ -17,7 +17,7 @@ import pytest
 import contfric as cf
 from contfric.continuation.accuracy import off_circle
 from contfric.continuation.vertices import symmetric_part
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.orbit.system import Margin, Test
 from contfric.signature.holds import TOUCH
 
@@ -146,11 +146,11 @@ def test_multipliers_do_not_jump_where_a_stick_begins_tangentially() -> None:
 
 def is_tangential(orbit: cf.Orbit) -> bool:
     """Whether a slide of an orbit comes to a stick without acceleration."""
-    word = orbit.system.word
+    itinerary = orbit.system.itinerary
     return any(
         test.margin is Margin.EXIT
-        and word[test.segment][0] != "stick"
-        and word[(test.segment + 1) % len(word)][0] == "stick"
+        and itinerary[test.segment][0] != "stick"
+        and itinerary[(test.segment + 1) % len(itinerary)][0] == "stick"
         and abs(margin) < 1e-12
         for test, margin in zip(orbit.system.tests, orbit.margins, strict=True)
     )
@@ -198,10 +198,12 @@ def test_a_slide_between_two_holds_must_last() -> None:
     seen = 0
     for case in list(CHOSEN)[:2]:
         for branch in branches(case):
-            word = branch.system.word
-            for i, (_, exit_) in enumerate(word):
-                if exit_ == TOUCH and word[i - 2][1].startswith("hold@"):
-                    assert Test(Margin.LASTING, (i - 1) % len(word), "v") in branch.system.tests
+            itinerary = branch.system.itinerary
+            for i, (_, exit_) in enumerate(itinerary):
+                if exit_ == TOUCH and itinerary[i - 2][1].startswith("hold@"):
+                    assert (
+                        Test(Margin.LASTING, (i - 1) % len(itinerary), "v") in branch.system.tests
+                    )
                     seen += 1
     assert seen > 4
 
@@ -217,7 +219,7 @@ def test_the_place_of_a_vertex_does_not_depend_on_where_it_is_looked_for(
     vector = orbit.vector.copy()
     active = orbit.model.index_of("Omega")
     vector[active] = vertex + sign * distance
-    beside = polish(replace(orbit.as_half(), vector=vector)).as_whole()
+    beside = refine(replace(orbit.as_half(), vector=vector)).as_whole()
     found = symmetric_part(beside, active)
     if found is None:
         assert distance > 1e-5
@@ -245,7 +247,7 @@ def test_what_is_solved_is_determined(seed: int) -> None:
     from contfric.orbit.linear import assembled
 
     for branch in found.branches[:8]:
-        orbit = polish(branch[len(branch) // 2], damped=False)
+        orbit = refine(branch[len(branch) // 2], damped=False)
         if not orbit.converged:
             continue
         inverse = np.linalg.inv(assembled(orbit.system, orbit.joints, orbit.vector))

@@ -14,7 +14,7 @@ from contfric.errors import ContfricError
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.linear import jacobian_blocks, stacked
 from contfric.orbit.sensitivity import joint_sensitivities
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 from contfric.quantities.motion import Motion
 
 PARAMS = st.fixed_dictionaries(
@@ -95,7 +95,7 @@ def test_gradients_are_differences_of_orbits(params: dict[str, float], name: str
     for k in (1, -1, 2, -2):
         vector = orbit.vector.copy()
         vector[orbit.model.index_of(by)] += 1e-4 * k
-        beside = polish(replace(orbit, vector=vector), damped=False)
+        beside = refine(replace(orbit, vector=vector), damped=False)
         if not (beside.converged and beside.admissible):
             return
         values.append(beside.quantity(name))

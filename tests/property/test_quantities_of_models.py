@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: Smooth cycles, impacts, resets, clocks, sliding, stiff friction, no excitation; the stiff ones take long.
 MODELS = ("bang-bang", "belt", "dead-band", "gear-pair", "impact", "integrate-and-fire", "jenkins")
@@ -23,7 +23,7 @@ def slope_of(orbit: cf.Orbit, name: str, quantity: str) -> tuple[float, float]:
     for by in (1, -1, 2, -2):
         vector = orbit.vector.copy()
         vector[k] += by * step
-        beside = polish(replace(orbit, vector=vector), damped=False)
+        beside = refine(replace(orbit, vector=vector), damped=False)
         assert beside.converged
         values.append(beside.quantity(quantity))
     one, two = (values[0] - values[1]) / (2 * step), (values[2] - values[3]) / (4 * step)

@@ -14,7 +14,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.matching import identity
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 #: The first ones, none left out. (Of the first 120 one, 67, ends where Omega = 1/2 is a continuum, as
 #: test_event_orbits has it, and would need an exception here.)
@@ -100,7 +100,7 @@ def test_every_point_is_a_solved_admissible_orbit(case: int | str) -> None:
             away = float(np.min(np.abs(orbit.multipliers - 1.0)))
             if away < 1e-4:
                 continue  # a fold or a branch point: at fixed parameters the problem is singular
-            solved = polish(orbit, damped=False)
+            solved = refine(orbit, damped=False)
             # nothing is left to correct but rounding, divided by the distance from the singular
             # case and, beside an event, from the tangential one: where both are small Newton's method
             # cannot see that it has converged
@@ -128,7 +128,7 @@ def test_every_end_has_its_reason(case: int | str) -> None:
 
 @each_case
 def test_no_branch_is_computed_twice(case: int | str) -> None:
-    """Two computed branches of one word do not share an orbit."""
+    """Two computed branches of one itinerary do not share an orbit."""
     found = [b for b in diagram(case).branches if not b.mirrored]
     for k, one in enumerate(found):
         for other in found[:k]:
@@ -161,8 +161,8 @@ def test_a_smaller_step_changes_nothing(case: int | str) -> None:
     assert [kind for kind, _ in a] == [kind for kind, _ in b]
     for (_, one), (_, other) in zip(a, b, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
-    words = [
+    itineraries = [
         Counter((identity(b[0]), b.system.half, b.mirrored) for b in d.branches)
         for d in (coarse, fine)
     ]
-    assert words[0] == words[1]
+    assert itineraries[0] == itineraries[1]

@@ -156,7 +156,7 @@ def test_static_friction_above_kinetic() -> None:
         model, _ = structure(seed, static=1.2)
         orbit = cf.find_orbit(model)
         assert orbit.residual < 1e-12 and np.min(orbit.margins) > -1e-9
-        found += len(orbit.word) > 4
+        found += len(orbit.itinerary) > 4
     assert found >= 2
 
 
@@ -171,14 +171,14 @@ def test_models_come_back_with_their_surfaces(tmp_path: Any) -> None:
         cf.simulate(m, orbit.params, state=state[1:], time=float(state[0]), periods=2)
         for m in (model, again)
     )
-    assert one.word == other.word
+    assert one.itinerary == other.itinerary
     np.testing.assert_array_equal(one.states, other.states)
     cf.save(orbit, tmp_path / "orbit.npz")
     from contfric.models.files import model_of
 
     model_of.cache_clear()
     loaded = cf.load(tmp_path / "orbit.npz")
-    assert loaded.word == orbit.word and loaded.model is not model
+    assert loaded.itinerary == orbit.itinerary and loaded.model is not model
     np.testing.assert_allclose(loaded.multipliers, orbit.multipliers, atol=1e-10)
 
 

@@ -10,14 +10,14 @@ from contfric.errors import NotationError
 from contfric.models import load_model
 from contfric.signature import (
     Signature,
-    canonical_word,
+    canonical_itinerary,
     crossing,
     double,
     is_closed_walk,
-    mirror_word,
+    mirror_itinerary,
     parse_signature,
     reduce_signature,
-    reduced_word,
+    reduced_itinerary,
     successors,
     swap_stop,
     transition_graph,
@@ -100,7 +100,7 @@ def test_mirror_is_an_involution(signature: Signature) -> None:
 
 
 @given(walks())
-def test_symmetric_word_is_its_half_and_the_mirror_of_it(signature: Signature) -> None:
+def test_symmetric_itinerary_is_its_half_and_the_mirror_of_it(signature: Signature) -> None:
     image = signature.mirror()
     try:
         glued = Signature(COULOMB, signature.segments + image.segments)
@@ -118,33 +118,33 @@ def test_reduced_pieces_are_the_walk(signature: Signature) -> None:
     modes = {name: COULOMB.domain_by_name[name].mode for name in joined}
     for piece in pieces:
         assert {modes[name] for name in piece.domains} == {piece.mode}
-    word = reduced_word(signature)
-    assert is_closed_walk(word, COULOMB)
-    assert canonical_word(word, COULOMB) == word
+    itinerary = reduced_itinerary(signature)
+    assert is_closed_walk(itinerary, COULOMB)
+    assert canonical_itinerary(itinerary, COULOMB) == itinerary
 
 
 @given(walks())
 def test_reducing_commutes_with_mirror_and_doubling(signature: Signature) -> None:
-    word = reduced_word(signature)
-    assert reduced_word(signature.mirror()) == mirror_word(word, COULOMB)
-    assert mirror_word(mirror_word(word, COULOMB), COULOMB) == word
-    assert reduced_word(signature.doubled()) == double(word)
+    itinerary = reduced_itinerary(signature)
+    assert reduced_itinerary(signature.mirror()) == mirror_itinerary(itinerary, COULOMB)
+    assert mirror_itinerary(mirror_itinerary(itinerary, COULOMB), COULOMB) == itinerary
+    assert reduced_itinerary(signature.doubled()) == double(itinerary)
     assert signature.doubled().periods == 2 * signature.periods
 
 
 @given(walks())
 def test_swapping_a_stop_twice_changes_nothing(signature: Signature) -> None:
-    word = reduced_word(signature)
-    for joint in range(len(word)):
-        following = word[(joint + 1) % len(word)]
-        here = COULOMB.mode_by_name[word[joint][0]]
+    itinerary = reduced_itinerary(signature)
+    for joint in range(len(itinerary)):
+        following = itinerary[(joint + 1) % len(itinerary)]
+        here = COULOMB.mode_by_name[itinerary[joint][0]]
         if here.sliding or not COULOMB.mode_by_name[following[0]].sliding:
             continue
         try:
-            swapped = swap_stop(word, joint, following[1], COULOMB)
+            swapped = swap_stop(itinerary, joint, following[1], COULOMB)
         except NotationError:
             continue  # the slide cannot reverse into the direction in which the stick is left
-        # the stick at the seam was word[0]: its removal moves the joint
-        moved = joint - 1 if joint == len(word) - 1 else joint
+        # the stick at the seam was itinerary[0]: its removal moves the joint
+        moved = joint - 1 if joint == len(itinerary) - 1 else joint
         back = swap_stop(swapped, moved, following[1], COULOMB)
-        assert canonical_word(back, COULOMB) == word
+        assert canonical_itinerary(back, COULOMB) == itinerary

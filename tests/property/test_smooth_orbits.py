@@ -78,11 +78,11 @@ def test_a_wall_gives_one_diagram_from_every_branch(seed: int) -> None:
     for branch in found.branches:
         again = cf.explore(branch[len(branch) // 2], "gap", (low, high), max_periods=2)
         [same] = [e for e in again.events if abs(e.bifurcation.params["gap"] - size) < 1e-11]
-        words = [
+        itineraries = [
             {(d.branches[i][1].signature.canonical, d.branches[i][1].periods) for i in e.branches}
             for d, e in ((found, grazing), (again, same))
         ]
-        assert words[0] == words[1]
+        assert itineraries[0] == itineraries[1]
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_a_mass_at_rest_on_a_wall_leaves_it_where_nothing_presses(gap: float) ->
     assert resting is not None
     params = {"gap": gap, "omega": 0.8, "A": 1.0, "zeta": 0.05}
     found = cf.simulate(resting, params, state=(gap, 0.0), periods=1)
-    rests = found.word[0][0] == "chatter"
+    rests = found.itinerary[0][0] == "chatter"
     assert rests == (np.cos(0.0) - gap > 0.0)  # the force on a mass there
 
 

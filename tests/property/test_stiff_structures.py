@@ -35,7 +35,7 @@ def light_tip(seed: int) -> tuple[cf.Model, np.ndarray, float]:
 def missed(orbit: cf.Orbit) -> float:
     """Return how far the flow without derivatives ends from the joints and from the exit surfaces."""
     view, worst = FlowView(orbit.model, orbit.vector), 0.0
-    for i, (mode, surface) in enumerate(orbit.word):
+    for i, (mode, surface) in enumerate(orbit.itinerary):
         (t, *y), end = orbit.cycle[i], orbit.ends[i]
         reached = view.state(mode, t, np.array(y), end[0] - t)
         worst = max(worst, float(np.max(np.abs(reached - end[1:]))))
@@ -46,7 +46,7 @@ def missed(orbit: cf.Orbit) -> float:
 def multipliers_by_transition(orbit: cf.Orbit) -> np.ndarray:
     """Return those of the product of transition matrices: the force of a spring is continuous."""
     view, turn = FlowView(orbit.model, orbit.vector), np.eye(4)
-    for i, (mode, _) in enumerate(orbit.word):
+    for i, (mode, _) in enumerate(orbit.itinerary):
         (t, *y), end = orbit.cycle[i], orbit.ends[i]
         turn = view.jacobian(mode, t, np.array(y), end[0] - t)[:, 1:5] @ turn
     return np.linalg.eigvals(turn)
@@ -65,7 +65,9 @@ def test_converged_orbits_end_on_their_surfaces_whatever_oscillates_within_a_con
     for branch in found.branches:
         for orbit in branch:
             lasting = np.diff(np.append(orbit.cycle[:, 0], orbit.ends[-1, 0]))
-            contacts = [d for (mode, _), d in zip(orbit.word, lasting, strict=True) if "c" in mode]
+            contacts = [
+                d for (mode, _), d in zip(orbit.itinerary, lasting, strict=True) if "c" in mode
+            ]
             # where the ends of a contact are one, its rows would divide zero by zero
             if not contacts or min(contacts) < 1e-3:
                 continue

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.solve import polish
-from contfric.signature import canonical_word, mirror_word
+from contfric.orbit.solve import refine
+from contfric.signature import canonical_itinerary, mirror_itinerary
 
 CASES = {
     "1a": {"Omega": 0.5, "S": 0.32, "S0": 0.4},
@@ -51,12 +51,14 @@ def gap(a: cf.Orbit, b: cf.Orbit) -> float:
 def test_mirror_image_is_an_orbit(name: str) -> None:
     orbit = orbit_of(name)
     image = orbit.mirror()
-    solved = polish(image, damped=False)
+    solved = refine(image, damped=False)
     assert solved.converged and solved.residual < 1e-13
     assert np.max(np.abs(solved.joints - image.joints)) < 1e-11, "nothing is left to correct"
     assert image.admissible, image.violations()
     assert np.allclose(image.margins.min(), orbit.margins.min(), rtol=0, atol=1e-12)
-    assert canonical_word(image.word, image.model) == mirror_word(orbit.word, orbit.model)
+    assert canonical_itinerary(image.itinerary, image.model) == mirror_itinerary(
+        orbit.itinerary, orbit.model
+    )
     assert np.allclose(image.multipliers, orbit.multipliers, rtol=1e-12, atol=1e-12)
     assert (image.x_max, image.x_min) == (-orbit.x_min, -orbit.x_max)
     assert image.asymmetry == orbit.asymmetry
@@ -77,7 +79,7 @@ def test_mirror_image_is_simulated_as_such(name: str) -> None:
 def test_mirror_twice_is_the_orbit(name: str) -> None:
     orbit = orbit_of(name)
     twice = orbit.mirror().mirror()
-    assert twice.system is orbit.system or twice.word == orbit.word
+    assert twice.system is orbit.system or twice.itinerary == orbit.itinerary
     assert gap(orbit, twice) < 1e-14
     assert twice.signature == orbit.signature
 
@@ -87,7 +89,11 @@ def test_symmetric_orbits_are_their_own_mirror_images(name: str) -> None:
     orbit = orbit_of(name)
     symmetric = name in SYMMETRIC
     assert orbit.symmetric == symmetric == orbit.system.half
-    apart = gap(orbit, orbit.mirror()) if len(orbit.word) == len(orbit.mirror().word) else np.inf
+    apart = (
+        gap(orbit, orbit.mirror())
+        if len(orbit.itinerary) == len(orbit.mirror().itinerary)
+        else np.inf
+    )
     assert (apart < 1e-12) == symmetric
     assert (orbit.asymmetry < 1e-12) == symmetric
 
@@ -100,7 +106,7 @@ def test_half_and_whole_problem_have_the_same_solution(name: str) -> None:
     # start the whole problem off the symmetric subspace: it comes back to it
     rng = np.random.default_rng(4)
     start = replace(whole, joints=whole.joints + 1e-4 * rng.standard_normal(whole.joints.shape))
-    solved = polish(start)
+    solved = refine(start)
     assert solved.converged
     assert np.max(np.abs(solved.joints - whole.joints)) < 1e-12
     assert np.allclose(np.sort(solved.multipliers), np.sort(half.multipliers), rtol=0, atol=1e-12)

@@ -14,7 +14,7 @@ from scipy.optimize import fsolve
 
 import contfric as cf
 from contfric.orbit import sections
-from contfric.orbit.solve import polish
+from contfric.orbit.solve import refine
 
 MODELS = Path(__file__).parents[1] / "models"
 WALLS = MODELS / "walls.yaml"
@@ -115,14 +115,14 @@ def test_joints_of_a_smooth_cycle_are_of_no_importance() -> None:
     """Whichever crossings a cycle is found by: the same events, and joints move before they vanish."""
     orbit = cf.find_orbit(WALLS, {**SMOOTH, "a": 2.5}).as_whole()
     expected = [(b.kind, b.params["a"]) for b in branch("smooth").bifurcations]
-    word, joints = sections._every_crossing(orbit)
-    assert len(word) == 6 and len(orbit.word) == 2
-    for down in (i for i in range(6) if orbit.model.section_sides[word[i]] > 0):
+    itinerary, joints = sections._every_crossing(orbit)
+    assert len(itinerary) == 6 and len(orbit.itinerary) == 2
+    for down in (i for i in range(6) if orbit.model.section_sides[itinerary[i]] > 0):
         own = joints[[(down + 1) % 6, (down + 2) % 6]].copy()
-        if orbit.model.section_pair(*word[(down + 1) % 6]) != orbit.word[0]:
+        if orbit.model.section_pair(*itinerary[(down + 1) % 6]) != orbit.itinerary[0]:
             own = own[::-1].copy()
         own[1, 0] += orbit.period * (own[1, 0] <= own[0, 0])
-        other = polish(replace(orbit, joints=own))
+        other = refine(replace(orbit, joints=own))
         assert other.converged and np.abs(other.state(1.0) - orbit.state(1.0)).max() < 1e-9
         found = cf.continue_orbit(other, "a", (-3.0, 3.0))
         events = [(b.kind, b.params["a"]) for b in found.bifurcations]

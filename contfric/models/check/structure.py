@@ -349,5 +349,5 @@ def _place(probe: Probe, t: float, y: FloatArray) -> str:
 
 
 def _sides(signs: dict[str, int]) -> str:
-    words = {1: "above", -1: "below", 0: "on"}
-    return ", ".join(f"{words[side]} {name}" for name, side in signs.items())
+    itineraries = {1: "above", -1: "below", 0: "on"}
+    return ", ".join(f"{itineraries[side]} {name}" for name, side in signs.items())

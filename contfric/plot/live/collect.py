@@ -261,7 +261,7 @@ def _watched(orbit: Orbit) -> tuple[str, ...]:
     """Return what each margin is, and where."""
     return tuple(
         f"{test.margin.value}, at {test.surface}, in segment {test.segment + 1}: "
-        f"{orbit.system.word[test.segment][0]}"
+        f"{orbit.system.itinerary[test.segment][0]}"
         for test in orbit.system.tests
     )
 

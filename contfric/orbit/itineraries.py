@@ -9,38 +9,38 @@ import numpy as np
 
 from contfric.models.definition import Model
 from contfric.orbit.structure import exit_domains
-from contfric.orbit.system import IntArray, Word
+from contfric.orbit.system import IntArray, Itinerary
 from contfric.signature.reduced import mirror_pair
 
 
 @cache
-def mirror_pairs(model: Model, word: Word) -> Word:
-    """Return the mirror image of a word, segment by segment (not rotated)."""
+def mirror_pairs(model: Model, itinerary: Itinerary) -> Itinerary:
+    """Return the mirror image of an itinerary, segment by segment (not rotated)."""
     assert model.symmetry is not None
-    return tuple(mirror_pair(pair, model) for pair in word)
+    return tuple(mirror_pair(pair, model) for pair in itinerary)
 
 
 @cache
-def half_of(model: Model, word: Word, periods: int) -> Word | None:
+def half_of(model: Model, itinerary: Itinerary, periods: int) -> Itinerary | None:
     """Return the first half if the second one is its mirror image, else None.
 
     An orbit of an even number of periods has no such half: twice the symmetry is one period.
     """
-    if model.symmetry is None or len(word) % 2 or periods % 2 == 0:
+    if model.symmetry is None or len(itinerary) % 2 or periods % 2 == 0:
         return None
-    half = word[: len(word) // 2]
-    return half if mirror_pairs(model, half) == word[len(word) // 2 :] else None
+    half = itinerary[: len(itinerary) // 2]
+    return half if mirror_pairs(model, half) == itinerary[len(itinerary) // 2 :] else None
 
 
-def whole_of(model: Model, word: Word, half: bool) -> Word:
-    """Return the word of the whole orbit."""
-    return word + mirror_pairs(model, word) if half else word
+def whole_of(model: Model, itinerary: Itinerary, half: bool) -> Itinerary:
+    """Return the itinerary of the whole orbit."""
+    return itinerary + mirror_pairs(model, itinerary) if half else itinerary
 
 
 def end_domain(model: Model, mode: str, exit_: str, after: str, signs: dict[str, int]) -> str:
     """Return the domain in which a segment ends: one whose exit leads on, by the signs there.
 
-    Where a stop lies on a surface to rounding (at an event) the word decides, not the sign.
+    Where a stop lies on a surface to rounding (at an event) the itinerary decides, not the sign.
     """
 
     def wrong(domain: str) -> int:
@@ -54,7 +54,7 @@ def passed_domains(model: Model, start: str, end: str, crossed: list[str]) -> li
     """Return the domains of one segment in order, from the surfaces that it crosses.
 
     A crossing at a joint itself may be counted or not, by rounding: one that leads nowhere is left
-    out, and the walk is cut or completed so that it ends where the word says.
+    out, and the walk is cut or completed so that it ends where the itinerary says.
     """
     mode = model.domain_by_name[start].mode
     path = [start]

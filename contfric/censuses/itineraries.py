@@ -1,11 +1,11 @@
-"""Which walks a census asks for: the closed words of the transition graph up to a number of stops.
+"""Which walks a census asks for: the closed itineraries of the transition graph up to a number of stops.
 
-A **stop** is the end of a slide on a switching surface. The closed words with up to N stops are
+A **stop** is the end of a slide on a switching surface. The closed itineraries with up to N stops are
 generated as necklaces (least rotations), by the recursion of H. Fredricksen, I. J. Kessler and J. Maiorana
-(Discrete Math. 23 (1978) 207-210) in the form of F. Ruskey: a word ``a_1 .. a_t`` whose longest
+(Discrete Math. 23 (1978) 207-210) in the form of F. Ruskey: an itinerary ``a_1 .. a_t`` whose longest
 Lyndon prefix has length p can be continued by the letters ``>= a_{t+1-p}``, and is a necklace if p
-divides t. Of a word and its mirror image one is kept. Words that repeat a shorter one are kept: an
-orbit born at a period doubling walks the word of its parent twice, and is not its repetition.
+divides t. Of an itinerary and its mirror image one is kept. Itineraries that repeat a shorter one are kept: an
+orbit born at a period doubling walks the itinerary of its parent twice, and is not its repetition.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from functools import cache
 
 from contfric.errors import ParameterError
 from contfric.models.definition import Model
-from contfric.orbit.words import mirror_pairs
-from contfric.signature import ReducedWord
+from contfric.orbit.itineraries import mirror_pairs
+from contfric.signature import ReducedItinerary
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.edits import entered, show
 from contfric.signature.reduced import ReducedPair, fuses
@@ -24,7 +24,7 @@ from contfric.signature.reduced import ReducedPair, fuses
 
 @cache
 def letters_of(model: Model) -> tuple[ReducedPair, ...]:
-    """Return the (mode, exit) pairs that can be a segment of a reduced word, in canonical order.
+    """Return the (mode, exit) pairs that can be a segment of a reduced itinerary, in canonical order.
 
     Examples
     --------
@@ -57,30 +57,30 @@ def is_stop(model: Model, pair: ReducedPair) -> bool:
     return not model.mode_by_name[mode].sliding and model.surface_by_name[surface].switching
 
 
-def stops_of(model: Model, word: ReducedWord) -> int:
-    """Return the number of stops of a word."""
-    return sum(is_stop(model, pair) for pair in word)
+def stops_of(model: Model, itinerary: ReducedItinerary) -> int:
+    """Return the number of stops of an itinerary."""
+    return sum(is_stop(model, pair) for pair in itinerary)
 
 
-def canonical_pair(model: Model, word: ReducedWord) -> ReducedWord:
-    """Return the word that stands for a word and its mirror image in a census."""
+def canonical_pair(model: Model, itinerary: ReducedItinerary) -> ReducedItinerary:
+    """Return the itinerary that stands for an itinerary and its mirror image in a census."""
     letters = letters_of(model)
-    least = _least([letters.index(pair) for pair in word], _mirror_letters(model))
+    least = _least([letters.index(pair) for pair in itinerary], _mirror_letters(model))
     return tuple(letters[k] for k in least)
 
 
-def closed_words(model: Model, stops: int) -> list[ReducedWord]:
-    """Return the closed words with up to ``stops`` stops, one of each mirror pair, canonical.
+def closed_itineraries(model: Model, stops: int) -> list[ReducedItinerary]:
+    """Return the closed itineraries with up to ``stops`` stops, one of each mirror pair, canonical.
 
     Raises
     ------
     ParameterError
-        If the model has closed walks without a stop: the number of stops does not bound its words.
+        If the model has closed walks without a stop: the number of stops does not bound its itineraries.
 
     Examples
     --------
     >>> from contfric.models import load_model
-    >>> [len(closed_words(load_model("coulomb"), n)) for n in (1, 2, 3)]
+    >>> [len(closed_itineraries(load_model("coulomb"), n)) for n in (1, 2, 3)]
     [1, 5, 10]
     """
     letters, graph = letters_of(model), _Graph(model)
@@ -89,7 +89,7 @@ def closed_words(model: Model, stops: int) -> list[ReducedWord]:
     images = _mirror_letters(model)
     found = [w for w in _necklaces(graph, weights, stops) if _least(w, images) == w]
     found.sort(key=lambda w: (sum(weights[k] for k in w), len(w), w))
-    return [tuple(letters[k] for k in word) for word in found]
+    return [tuple(letters[k] for k in itinerary) for itinerary in found]
 
 
 @cache
@@ -101,12 +101,12 @@ def _mirror_letters(model: Model) -> tuple[int, ...] | None:
     return tuple(letters.index(pair) for pair in mirror_pairs(model, letters))
 
 
-def _least(word: Sequence[int], images: tuple[int, ...] | None) -> tuple[int, ...]:
-    """Return the least rotation of a word or of its mirror image."""
-    words = [tuple(word)]
+def _least(itinerary: Sequence[int], images: tuple[int, ...] | None) -> tuple[int, ...]:
+    """Return the least rotation of an itinerary or of its mirror image."""
+    itineraries = [tuple(itinerary)]
     if images is not None:
-        words.append(tuple(images[k] for k in word))
-    return min(rotated(w, least_rotation(w)) for w in words)
+        itineraries.append(tuple(images[k] for k in itinerary))
+    return min(rotated(w, least_rotation(w)) for w in itineraries)
 
 
 class _Graph:
@@ -160,18 +160,20 @@ def _necklaces(graph: _Graph, weights: Sequence[int], most: int) -> Iterator[tup
     count = len(weights)
 
     def extended(
-        word: tuple[int, ...], lyndon: int, weight: int, reached: tuple[tuple[int, int], ...]
+        itinerary: tuple[int, ...], lyndon: int, weight: int, reached: tuple[tuple[int, int], ...]
     ) -> Iterator[tuple[int, ...]]:
-        if len(word) % lyndon == 0 and graph.closes(reached, word[-1], word[0]):
-            yield word
-        least = word[len(word) - lyndon]
+        if len(itinerary) % lyndon == 0 and graph.closes(reached, itinerary[-1], itinerary[0]):
+            yield itinerary
+        least = itinerary[len(itinerary) - lyndon]
         for letter in range(least, count):
             if weight + weights[letter] > most:
                 continue
-            following = graph.step(reached, word[-1], letter)
+            following = graph.step(reached, itinerary[-1], letter)
             if following:
-                longer = lyndon if letter == least else len(word) + 1
-                yield from extended((*word, letter), longer, weight + weights[letter], following)
+                longer = lyndon if letter == least else len(itinerary) + 1
+                yield from extended(
+                    (*itinerary, letter), longer, weight + weights[letter], following
+                )
 
     for first in range(count):
         if weights[first] <= most:
