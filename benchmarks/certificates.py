@@ -23,8 +23,10 @@ import numpy as np
 
 import contfric as cf
 from contfric.certify.files import certificate_data
+from contfric.certify.tube_file import tubes_of
 from contfric.errors import ContfricError
-from contfric.verify.curves.file import check_text
+from contfric.verify.file import check_text
+from tests import tube_oracle
 from tests.certificate_oracle import false_statements, mutated
 from tests.contracts.test_event_files import KINDS, files
 from tests.event_oracle import changed, false_event
@@ -178,29 +180,52 @@ def census() -> None:
 
 
 def cheats(count: int) -> None:
-    """Change true certificates of orbits and events, and decide by 60 digits those that are verified.
+    """Change true certificates of orbits, events and tubes, and decide by 60 digits those that are verified.
 
     Each case has its own seed and is a line of ``cheats.txt``: a run that was ended goes on there.
     """
     done = Path("cheats.txt")
     known = done.read_text().splitlines() if done.exists() else []
     begin = time.process_time()
-    orbits = _certificates(np.random.default_rng(23))
-    events = files()
+    true = {"orbit": _certificates(np.random.default_rng(23)), "tube": _tubes()}
+    true |= {kind: [text] for kind, text in files().items()}
     with done.open("a") as out:
         for k in range(len(known), count):
-            rng, kind = np.random.default_rng([23, k]), ("orbit", *KINDS)[k % 2 and 1 + k // 2 % 9]
-            if kind == "orbit":
-                data: dict[str, Any] = mutated(json.loads(orbits[k // 2 % len(orbits)]), rng)
-            else:
-                data = changed(json.loads(events[kind]), rng)
+            rng = np.random.default_rng([23, k])
+            kind = "tube" if k % 20 == 19 else KINDS[k // 2 % 9] if k % 2 else "orbit"
+            data: dict[str, Any] = json.loads(true[kind][k // 2 % len(true[kind])])
+            change, is_false = _CHEATS.get(kind, (changed, false_event))
+            data = change(data, rng)
             verdict = "refused"
             if check_text(json.dumps(data)).yes:
-                is_false = false_statements if kind == "orbit" else false_event
                 verdict = "VERIFIED, BUT FALSE" if is_false(data) else "verified, and true"
             known.append(f"{kind}: {verdict}")
             print(known[-1], file=out, flush=True)
     print(Counter(known), f"{time.process_time() - begin:.1f} s of the processor")
+
+
+def _changed_tube(data: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    return tube_oracle.changed(tube_oracle.cut(data, rng), rng)
+
+
+_CHEATS: dict[str, tuple[Any, Any]] = {
+    "orbit": (mutated, false_statements),
+    "tube": (_changed_tube, tube_oracle.false_tube),
+}
+
+
+def _tubes() -> list[str]:
+    """Return tubes of Fig. 5: with a fold and two ends, with a branch point, without an event."""
+    found = []
+    for name, omega, span in (
+        ("1a", 0.54, (0.4, 0.6)),
+        ("2s", 0.5, (0.485, 0.6)),
+        ("0s", 0.55, (0.5, 0.56)),
+    ):
+        orbit = cf.solve_orbit("coulomb", name, {"Omega": omega, "S": 0.32, "S0": 0.4})
+        branch = cf.continue_orbit(orbit, "Omega", span)
+        found += [json.dumps(tube) for tube in tubes_of(branch.certify())]
+    return found
 
 
 def _certificates(rng: np.random.Generator) -> list[str]:

@@ -13,13 +13,12 @@ import numpy as np
 from mpmath import mp, mpf
 
 from tests.certificate_oracle import DIGITS, Truth, ball
+from tests.tube_oracle import solved
 
 #: How far to each side of the ball: multipliers are differences that are known to 1e-22.
 BESIDE = mpf(10) ** -18
 #: What is touched within a segment, by kind: whether it slides, and the surface.
 _TOUCHES = {"GS": (True, "v"), "T": (True, "F"), "AS": (False, "F")}
-#: About a fold, where orbits are the root of it away.
-BESIDE_FOLD = mpf(10) ** -14
 
 
 def _at(data: dict[str, Any], value: mpf, start: list[mpf]) -> tuple[Truth, list[mpf]] | None:
@@ -59,14 +58,21 @@ def _touched(data: dict[str, Any], truth: Truth, z: list[mpf]) -> mpf:
     return observed(tau)
 
 
-def _is_fold(data: dict[str, Any], value: mpf, radius: mpf, start: list[mpf]) -> bool:
-    near = []
-    for side in (-1, 1):
-        found = _at(data, value + side * (radius + BESIDE_FOLD), start)
-        away = found and max(abs(a - b) for a, b in zip(found[1], start, strict=True))
-        if found and away < mpf(10) ** -4:
-            near.append(max(found[0].multipliers(found[1]), key=abs))
-    return len(near) == 1 and abs(near[0] - 1) < mpf(10) ** -3
+def _is_fold(data: dict[str, Any], value: mpf, radius: mpf) -> bool:
+    """Tell whether a multiplier passes 1 between two orbits, whose parameter is in the ball."""
+    rows = [[ball(text)[0] for text in knot] for knot in data["knots"]]
+    kept = max(range(len(rows[0])), key=lambda k: abs(rows[1][k] - rows[0][k]))
+    try:
+        ends = [solved(data, row, kept) for row in rows]
+    except (ValueError, ZeroDivisionError):
+        return False
+    if not all(
+        abs(row[-1] - value) <= radius and truth.admissible(row[:-1]) for truth, row in ends
+    ):
+        return False
+    pairs = [truth.multipliers(row[:-1]) for truth, row in ends]
+    low, high = (mp.re((1 - one) * (1 - other)) for one, other in pairs)
+    return bool(low * high < 0)
 
 
 def _obeys(data: dict[str, Any], truth: Truth, z: list[mpf]) -> bool:
@@ -97,11 +103,12 @@ def false_event(data: dict[str, Any]) -> bool:
     """Tell whether what a file states of an event is not so."""
     with mp.workdps(DIGITS):
         value, radius = ball(data["value"])
-        start = [ball(row[k])[0] for row in data["near"] for k in (0, 1)]
+        sides = zip(*data["knots"], strict=True)
+        *start, _ = [sum(ball(text)[0] for text in side) / 2 for side in sides]
         if data["half"] and data["periods"] % 2 == 0:
             return True
         if data["kind"] == "SN":
-            return not _is_fold(data, value, radius, start)
+            return not _is_fold(data, value, radius)
         if data["kind"] in ("PD", "BP") and data["half"] != (data["kind"] == "BP"):
             return True
         ends = [_at(data, value + side * (radius + BESIDE), start) for side in (-1, 1)]
@@ -124,8 +131,24 @@ def changed(data: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
 def _move_value(data: dict[str, Any], rng: np.random.Generator) -> None:
     with mp.workdps(DIGITS):
         centre, radius = ball(data["value"])
-        centre += rng.choice([-1, 1]) * mpf(10) ** rng.uniform(-16, -2)
-        data["value"] = f"{mp.nstr(centre, 45)} +/- {mp.nstr(radius, 5)}"
+        off = rng.choice([-1, 1]) * mpf(10) ** rng.uniform(-35, -2)
+        data["value"] = _text(centre + off, radius)
+        if rng.uniform() < 0.7:  # and the piece of the curve with it
+            for knot in data["knots"]:
+                centre, radius = ball(knot[-1])
+                knot[-1] = _text(centre + off, radius)
+
+
+def _text(centre: mpf, radius: mpf) -> str:
+    return f"{mp.nstr(centre, 45)} +/- {mp.nstr(radius, 5)}"
+
+
+def _move_knot(data: dict[str, Any], rng: np.random.Generator) -> None:
+    knot = data["knots"][int(rng.integers(2))]
+    k = int(rng.integers(len(knot)))
+    with mp.workdps(DIGITS):
+        centre, radius = ball(knot[k])
+        knot[k] = _text(centre + rng.choice([-1, 1]) * mpf(10) ** rng.uniform(-35, 0), radius)
 
 
 def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -149,7 +172,9 @@ def _other_segment(data: dict[str, Any], rng: np.random.Generator) -> None:
     if rng.uniform() < 0.5 or len(data["segments"]) == 1:
         data["segments"][i] = kinds[int(rng.integers(4))]
     else:
-        del data["segments"][i], data["near"][i]
+        del data["segments"][i]
+        for knot in data["knots"]:
+            del knot[2 * i : 2 * i + 2]
 
 
 def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -165,5 +190,5 @@ def _other_parameter(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 _CHANGES = (
     *(_move_value, _other_params, _other_kind, _other_stop, _other_segment, _other_turn),
-    _other_parameter,
+    *(_other_parameter, _move_knot),
 )

@@ -97,13 +97,15 @@ def certify_diagram(
         ended,
         (
             *checkable([part for k in tasks for part in _parts_of(found.get(k))]),
-            *(tube for k in tasks for tube in _tubes(found.get(k))),
+            *(tube for k in tasks for tube in _tubes(found.get(k), until)),
         ),
     )
 
 
-def _tubes(proof: BranchCertificate | EventCertificate | None) -> list[dict[str, Any]]:
-    return tubes_of(proof) if isinstance(proof, BranchCertificate) else []
+def _tubes(
+    proof: BranchCertificate | EventCertificate | None, until: float
+) -> list[dict[str, Any]]:
+    return tubes_of(proof, until) if isinstance(proof, BranchCertificate) else []
 
 
 def _is_unfinished(proof: BranchCertificate | EventCertificate) -> bool:

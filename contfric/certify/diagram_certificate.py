@@ -15,7 +15,7 @@ from contfric.errors import ResultFileError, path_of
 _KIND, _FORMAT = "diagram", 1
 #: What a file holds that the checker does not look at.
 UNCHECKED = (
-    "the summary, orbits with holds, tubes that are left out (not decided, zeta of 1 or more), "
+    "the summary, orbits with holds, tubes that are left out (not decided), "
     "and a tube from an open end to the event there"
 )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +14,7 @@ from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
 from contfric.models.balls.numbers import working
-from contfric.verify.curves.file import check_text
-from contfric.verify.file import CHECKED_MODELS, Answer
+from contfric.verify.file import CHECKED_MODELS, FORMAT, Answer, check_text
 
 if TYPE_CHECKING:
     from contfric.certify.certificate import Certificate
@@ -27,6 +26,8 @@ _DIGITS = 40
 _WIDER = 1e-25
 #: Half-width of the ball of times about a touch.
 _BESIDE = 2.0**-40
+#: Share of the ball of a parameter between the two orbits that an event is shown to lie between.
+_WITHIN = arb(0.9)
 #: Bits with which the balls of events are printed.
 _EVENT_BITS = 320
 #: A larger file is no certificate: an orbit takes 4 kB, one of 400 segments 200 kB.
@@ -49,20 +50,17 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         )
     if not certificate.exists.proved:
         raise ParameterError(f"there is nothing to write: {certificate.why}")
-    m = orbit.joints.shape[1]
     with working(certificate.precision):
-        radii = [float(r.upper()) * (1 + 1e-12) for r in certificate.radii]
-        balls = [_printed(x) for x in certificate.enclosure]
-        multipliers = [_disc(mu) for mu in certificate.multipliers]
-    statements = {
-        "exists": certificate.exists.verdict,
-        "unique": certificate.unique.verdict,
-        "admissible": certificate.admissible.verdict,
-        "stable": certificate.stable.verdict,
-    }
+        radii = [float(r.upper()) * (1 + 1e-12) for r in unknowns_of(certificate.radii)]
+        balls = [_printed(x) for x in unknowns_of(certificate.enclosure)]
+        multipliers = [_disc(mu) for mu in sorted(certificate.multipliers, key=_rank)]
+    proved = ("exists", "unique", "admissible", "stable")
+    statements = [name for name in proved if getattr(certificate, name).proved]
+    if certificate.stable.verdict is Verdict.REFUTED:
+        statements.append("unstable")
     return {
         "certificate": "orbit",
-        "format": 1,
+        "format": FORMAT,
         "model": orbit.model.name,
         "params": orbit.params,
         "periods": orbit.periods,
@@ -72,13 +70,19 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         "radius": [radii[i : i + m] for i in range(0, len(radii), m)],
         "enclosure": [balls[i : i + m] for i in range(0, len(balls), m)],
         "multipliers": multipliers,
-        "statements": {
-            name: verdict.value
-            if verdict is not Verdict.REFUTED or name == "stable"
-            else Verdict.UNDECIDED.value
-            for name, verdict in statements.items()
-        },
+        "statements": statements,
     }
+
+
+def _rank(mu: acb) -> tuple[bool, float, float]:
+    """Return the place of a multiplier: the zero of a stick is last, and the upper one of a pair first."""
+    upper = 0.0 if mu.imag.contains(0) else float(mu.imag)
+    return bool(mu == 0), -upper, -float(mu.real)
+
+
+def unknowns_of(joints: Sequence[Any]) -> list[Any]:
+    """Return times and displacements of joints: every velocity is 0 there."""
+    return [x for k, x in enumerate(joints) if k % 3 != 2]
 
 
 def event_data(proof: EventCertificate) -> dict[str, Any]:
@@ -103,18 +107,25 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         raise ParameterError(
             f"a {event.kind.value} at a joint has no certificate file: the checker knows others only"
         )
-    m = orbit.joints.shape[1]
+    size = orbit.joints.size
     with working(_EVENT_BITS):
-        balls = [_printed(x) for x in proof.zero[: orbit.joints.size]]
+        value = _printed(proof.value)
+        radius, way = arb(value).rad(), [arb(0)] * size + [_WITHIN * arb(value).rad()]
+        if event.kind is Kind.SN:  # the parameter turns on the way from one side to the other
+            way = [radius.sqrt() / 64 * c for c in proof.zero[size : 2 * size]] + [arb(0)]
+        middle = [*proof.zero[:size], proof.value]
+        knots = [
+            [_text(arb((x + side * d).mid())) for x, d in zip(middle, way, strict=True)]
+            for side in (-1, 1)
+        ]
         at: list[Any] | None = None
         if condition is not None and condition.within:
             at = [condition.segment, condition.surface, _text(proof.zero[-2] + arb(0, _BESIDE))]
         elif condition is not None:
             at = [condition.segment, 1 if condition.surface == "F+" else -1]
-        value = _printed(proof.value)
     return {
         "certificate": "event",
-        "format": 1,
+        "format": FORMAT,
         "model": model,
         "params": dict(event.params),
         "parameter": proof.parameter,

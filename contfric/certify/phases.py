@@ -36,6 +36,7 @@ def in_phases(model: BallModel) -> BallModel:
         model.resets,
         slopes,
         model.alike,
+        model.fields,
     )
 
 

@@ -1,85 +1,127 @@
 """The tube of a branch as plain data, for the independent checker.
 
 A file holds the knots between which the boxes are, the events of multipliers that are in them, and the event
-at which the branch ends in the first or last of them. The checker makes its own boxes of these knots.
+at which the branch ends in the first or last of them. The checker makes its own boxes of these knots, which
+are mostly shorter than those of the proof. So here a :class:`_Run` goes along the boxes of the proof by steps
+that the checker decides, each of about the length of the last one. Where they would be far shorter than the
+box of the proof, the tube ends, with the reason.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import time
 from typing import TYPE_CHECKING, Any
 
+from flint import ctx
+
+from contfric.certify.files import unknowns_of
 from contfric.certify.inequalities import DURATION, INSIDE, JOINT
 from contfric.certify.piece import Piece
-from contfric.continuation.events import TERMINAL
-from contfric.verify.curves.file import check_text
-from contfric.verify.file import CHECKED_MODELS
+from contfric.continuation.events import TERMINAL, EndReason
+from contfric.models.balls.numbers import working
+from contfric.verify.curve import Box, check_admissible
+from contfric.verify.file import (
+    BITS,
+    CHECKED_MODELS,
+    FORMAT,
+    check_text,
+    events_between,
+    orbits_at,
+)
+from contfric.verify.motion import Refused, Undecided
 
 if TYPE_CHECKING:
     from contfric.certify.branch import BranchCertificate
+    from contfric.continuation.branch import Branch
 
 #: Half-width of the times at which a surface may be touched in the box of an end.
 _TIMES = 1e-3
+#: How often a box of the proof is halved; and one in which the branch ends.
+_HALVINGS, _END_HALVINGS = 8, 14
+#: Most boxes that are tried along a branch.
+_MOST = 20_000
+#: How much longer than the last box that was decided the next one is: after some in a row, and before; and
+#: how much shorter if one is not.
+_STEADY, _GROWTH, _SLOW, _SHORTER = 8, 1.3, 1.04, 0.75
+#: How near to zeta = 1 tubes in zeta are not written: boxes shrink in proportion to the distance from there.
+_CRITICAL = 0.01
+#: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
+#: distance from there.
+_BORN = 0.02
 #: What is in a file and not looked at, for a reader of it.
 _UNCHECKED = "what lies between an open end (null) and the event at which the branch ends"
 
+_Row = list[float]
 
-def tubes_of(proof: BranchCertificate) -> list[dict[str, Any]]:
-    """Return the tubes along a branch as plain data: one for each run of linked boxes.
 
-    There are none if the checker does not know the model, or the orbits have holds. Boxes with a damping of 1
-    or more are left out: the square root of ``1 - zeta^2`` is no power series with real coefficients there.
-    So is a tube that the checker does not decide, which would spoil its file.
+class _Run:
+    """A tube that grows from knot to knot by boxes that the checker decides.
+
+    Parameters
+    ----------
+    data : the file, without knots
+    start : its first knot
+    until : when to end, by ``time.time``
     """
     branch = proof.branch
     size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
     if branch.model.name not in CHECKED_MODELS or branch.system.holds:
         return []
-    runs: list[list[Piece]] = [[]]
-    for piece in proof.pieces:
+    ctx.cap = 3
+    try:
+        with working(BITS[0]):
+            runs = _runs(proof, until)
+    finally:
+        ctx.cap = cap
+    return [_data(proof, run) for run in runs if len(run.rows) > 1 + all(run.ends)]
+
+
+def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
+    branch, runs, run = proof.branch, list[_Run](), None
+    size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
+    kept, zeta = _kept(branch), branch.parameter == "zeta"
+    for k, piece in enumerate(proof.pieces):
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
-        damping = piece.values if branch.parameter == "zeta" else [branch[0].params["zeta"]]
-        known = known and max(damping) < 1
-        if not (known and piece.linked):
-            runs.append([])
-        if known:
-            runs[-1].append(piece)
-    found = [_tube(proof, run) for run in runs if run]
-    return [tube for tube in found if check_text(json.dumps(tube)).yes]
+        known = known and kept[0] <= piece.start and piece.stop <= kept[1]
+        # the checker's square root of zeta^2 - 1 has no power series at 0
+        off = [abs(value - 1) for value in piece.values]
+        if not known or (zeta and min(off) < _CRITICAL):
+            run = None
+            continue
+        a, b = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)
+        if piece.ends and k == 0:
+            run = _from_end(proof, b, a, until)
+        else:
+            if run is None or not piece.linked:
+                run = _Run(_data(proof), a, until)
+            _on(proof, k, run, b)
+        if run is not None and run not in runs:
+            runs.append(run)
+        run = None if run is None or run.why or run.ends[1] else run
+    return runs
 
 
-def _tube(proof: BranchCertificate, run: list[Piece]) -> dict[str, Any]:
-    first, last = (_end(proof, run, k) for k in (0, -1))
-    if run[0].ends and first is None:
-        run = run[1:] or run
-    if run[-1].ends and last is None:
-        run = run[:-1] or run
-    return _data(proof, run, [first, last])
+def _kept(branch: Branch) -> tuple[float, float]:
+    """Return the arclength from and up to which a branch is in its file."""
+    first, last = float(branch.arc[0]), float(branch.arc[-1])
+    born = [end.reason in (EndReason.BP, EndReason.PD) for end in branch.ends]
+    left_out = [_BORN * (last - first) * there for there in born]
+    return first + left_out[0], last - left_out[1]
 
 
-def _data(proof: BranchCertificate, run: list[Piece], ends: list[Any]) -> dict[str, Any]:
+def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
+    """Return a tube as plain data; without a run one that has no knots yet."""
     branch, system = proof.branch, proof.branch.system
-    orbit = branch[0]
-    columns = [j for j in range(orbit.joints.size + 1) if j % orbit.joints.shape[1] != 2]
-    knots = [run[0].knots[0], *(piece.knots[1] for piece in run)]
-    flip = "BP" if system.half else "PD"
-    events = [
-        [k, kind]
-        for k, piece in enumerate(run)
-        for kind, there in (
-            ("SN", piece.folds == 1),
-            (flip, piece.flips == 1),
-            ("NS", piece.tori and any(label.startswith("NS") for label in piece.events)),
-        )
-        if there
-    ]
+    kinds = run.kinds if run else []
     return {
         "certificate": "tube",
-        "format": 1,
+        "format": FORMAT,
         "model": branch.model.name,
-        "params": orbit.params,
+        "params": branch[0].params,
         "parameter": branch.parameter,
-        "periods": orbit.periods,
+        "periods": branch[0].periods,
         "half": bool(system.half),
         "segments": [list(pair) for pair in system.itinerary],
         "knots": [knot[columns].tolist() for knot in knots],
@@ -89,18 +131,34 @@ def _data(proof: BranchCertificate, run: list[Piece], ends: list[Any]) -> dict[s
     }
 
 
-def _end(proof: BranchCertificate, run: list[Piece], k: int) -> list[Any] | None:
-    """Return kind and place of the event at which the branch ends in a box, if the checker confirms it."""
-    piece = run[k]
-    for label in piece.events:
-        kind = label.split("_")[0]
-        if not piece.ends or kind not in {end.value for end in TERMINAL}:
-            continue
-        at = _places(proof, piece, label)
-        ends = [[kind, at], None] if k == 0 else [None, [kind, at]]
-        if check_text(json.dumps(_data(proof, [piece], ends))).yes:
-            return [kind, at]
+def _from_end(proof: BranchCertificate, row: _Row, before: _Row, until: float) -> _Run | None:
+    """Return the tube from an end of the branch before a knot to another knot, if one is decided."""
+    for end in _ends(proof, proof.pieces[0]):
+        run = _Run(_data(proof), row, until)
+        if run.finish(before, end):
+            run.ends[1] = end
+            run = run.turned()
+            return run if check_text(json.dumps(_data(proof, run))).yes else None
     return None
+
+
+def _on(proof: BranchCertificate, k: int, run: _Run, row: _Row) -> None:
+    """Let a tube go on through a box of the proof, or to the end of the branch in it."""
+    piece = proof.pieces[k]
+    if not piece.ends:
+        run.march(row)
+    elif k == len(proof.pieces) - 1:
+        for end in _ends(proof, piece):
+            if run.finish(row, end):
+                run.ends[1] = end
+                break
+
+
+def _ends(proof: BranchCertificate, piece: Piece) -> list[list[Any]]:
+    """Return kind and places of the events at which the branch may end in a box."""
+    terminal = {end.value for end in TERMINAL}
+    labels = [label for label in piece.events if label.split("_")[0] in terminal]
+    return [[label.split("_")[0], _places(proof, piece, label)] for label in labels]
 
 
 def _places(proof: BranchCertificate, piece: Piece, label: str) -> list[list[Any]]:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from functools import reduce
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
-from flint import arb, ctx
+from flint import acb, arb, ctx
 
-from contfric.verify.box import Box
-from contfric.verify.law import check_admissible, check_multipliers
-from contfric.verify.scene import Refused, Scene, Undecided, ball, number, phases, positive
+from contfric.verify.curve import INSIDE, Box, check_admissible, met_in
+from contfric.verify.motion import Refused, Scene, Undecided, ball, positive
 
 BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
-CHECKED_MODELS = ("coulomb",)
-_DAMAGED = AttributeError, LookupError, TypeError, ValueError, ArithmeticError, RecursionError
-_STATED = ("exists", "unique", "admissible", "stable")
+FORMAT, CHECKED_MODELS = 2, ("coulomb",)
+CLAIMS = "exists", "unique", "admissible", "stable", "unstable"  # of an orbit
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """Whether all statements of a file hold; if not, why; those that hold; the bits asked for."""
 
     yes: bool
@@ -29,67 +25,113 @@ class Answer:
     bits: int = 0
 
 
-def check_text(text: str, checks: Any = None) -> Answer:
-    """Check the text of a certificate file; what it may hold may be given, with checks of it."""
+def check_text(text: str) -> Answer:
+    """Check the text of a certificate file."""
     cap, ctx.cap = ctx.cap, 3
     try:
-        statements, bits = _check(json.loads(text), checks or CHECKS)
-        return Answer(True, "", statements, bits)
-    except Refused as error:
-        return Answer(False, str(error))
-    except _DAMAGED as error:
-        return Answer(False, f"damaged: {type(error).__name__}: {error}")
+        data = json.loads(text)
+        parts = data["checkable"] if data["certificate"] == "diagram" else [data]
+        found = [_check(part) for part in parts]
+        names = [part["certificate"] for part in parts]
+        ends = sum(part.get("ends", []).count(None) for part in parts)
+        counts = [f"{names.count(name)} {name}s" for name in CHECKS] + [f"{ends} open ends"]
+        statements = found[0][0] if parts == [data] else counts
+        return Answer(True, "", tuple(statements), max(bits for _, bits in found))
+    except Exception as error:
+        return Answer(False, str(error) if isinstance(error, Refused) else f"damaged: {error!r}")
     finally:
         ctx.cap = cap
 
 
-def _check(data: Any, checks: Any, whole: bool = True) -> tuple[tuple[str, ...], int]:
-    """Return what holds, and the bits that were needed; each part of a diagram asks for its own."""
-    kind, why = data.get("certificate"), ""
-    if data.get("format") != 1 or kind not in ((*checks, "diagram") if whole else checks):
-        raise Refused("it is no certificate of format 1")
-    if kind == "diagram":
-        needed = [_check(part, checks, False)[1] for part in data["checkable"]]
-        names = [part["certificate"] for part in data["checkable"]]
-        return tuple(f"{names.count(name)} {name}s" for name in checks), max(needed)
-    if data.get("model") not in CHECKED_MODELS:
-        raise Refused(f"the checker does not know the model {str(data.get('model'))[:40]}")
+def _check(data: Any) -> tuple[list[str], int]:
+    """Return what holds, and the bits that were needed."""
+    check, why = CHECKS.get(data["certificate"]), ""
+    if check is None or data.get("format") != FORMAT or data.get("model") not in CHECKED_MODELS:
+        raise Refused(f"it is no certificate of format {FORMAT} of {', '.join(CHECKED_MODELS)}")
     for bits in BITS:
         with ctx.workprec(bits):
             try:
-                return tuple(checks[kind](data)), bits
+                return check(data), bits
             except (Undecided, ZeroDivisionError) as error:
                 why = str(error)
     raise Refused(f"not decided with {BITS[-1]} bits: {why}")
 
 
-def _check_orbit(data: dict[str, Any]) -> list[str]:
-    claims, scene, verdicts = data["statements"], Scene(data), ("proved", "undecided", "refuted")
-    known = [claims[name] in verdicts[: 2 + (name == "stable")] for name in _STATED]
-    if len(claims) != 4 or not all(known) or claims["exists"] != "proved":
+def _knot(data: Any, row: Any) -> list[arb]:
+    """Return the unknowns and the parameter of a row of times, displacements and the parameter."""
+    *joints, value = map(ball, row)
+    omega = Scene(data, value).omega
+    return [*(c if k % 2 else c * omega for k, c in enumerate(joints)), value]
+
+
+def orbits_at(data: Any, known: Any = ()) -> list[Box]:
+    """Return the orbits next to the knots of a curve, the first ones if known; near folds normal to it."""
+    knots = [_knot(data, row) for row in data["knots"]]
+    pairs = list(zip(knots, [*knots[1:2], *knots], strict=False))[len(known) :]
+    return [*known, *(Box(data, at, None, Box(data, by, at).border).proved() for at, by in pairs)]
+
+
+def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], arb]:
+    """Return the events on the one curve of admissible orbits from a to b, or to an end; the parameter."""
+    box = Box(data, a.middle.entries(), b.middle.entries()).proved()
+    if not (box.holds(a) and box.holds(b)):
+        raise Undecided("one curve from knot to knot")
+    met, (scene, z) = met_in(box, a, b, *end) if end else {}, box.orbits(INSIDE)
+    check_admissible(scene, z, met, bool(end) and end[0] == "CS")
+    return box.events(a, b) + ([end[0]] if end else []), scene.value
+
+
+def _check_tube(data: Any) -> list[str]:
+    points, (left, right), found = orbits_at(data), data["ends"], list[Any]()
+    stop = len(points) - 2
+    if stop < bool(left and right) or "T" in [end[0] for end in (left, right) if end]:
+        raise Refused("it has too few knots, or no tube ends in this way")
+    for k, (a, b) in enumerate(pairwise(points)):
+        first, last, end = (b, a, left) if left and k == 0 else (a, b, right if k == stop else None)
+        if end:
+            check_admissible(*first.orbits(0))
+        found += [[k, kind] for kind in events_between(data, first, last, end)[0]]
+    stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
+    if sorted(found) != sorted(stated + data["events"]):
+        raise Refused(f"false: its events are {found}")
+    return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"]
+
+
+def _check_event(data: Any) -> list[str]:
+    kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
+    found, where = events_between(data, a, b, None if at is None else (kind, [at]))
+    if found != [kind]:
+        raise Refused(f"false: its events are {found}")
+    positive(value.rad() - abs(where - value.mid()), "it happens within the ball")
+    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"]
+
+
+def _check_orbit(data: Any) -> list[str]:
+    data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"]
+    if "exists" not in claims or not set(claims) <= set(CLAIMS):
         raise Refused("its statements are not those of an orbit")
-    joints, radii = ([[number(c) for c in row] for row in data[k]] for k in ("joints", "radius"))
-    for (*_, v), row in zip(joints, radii, strict=True):
-        positive(reduce(arb.min, row), "its boxes have a width")
-        positive(row[-1] - abs(v), "the printed velocity is 0 within its box")
-    printed, radius = (phases(rows, scene) for rows in (joints, radii))
-    own = {**data, "parameter": "S"}  # at one value of it
-    _, z = Box(own, scene.count * 2, [*printed, scene.s]).proved().orbits(0)
-    for value, p, r in zip(z, printed, radius, strict=True):
-        positive(r - abs(value - p), "the solution lies in the box around the printed joints")
-    if claims["unique"] == "proved":
-        box = Box(own, scene.count * 2, [*printed, scene.s])
-        off = zip(radius, printed, box.middle.entries()[:-1], strict=True)
-        box.proved([*(r + abs(p - m) for r, p, m in off), arb(0)])
-    for i, row in zip(range(scene.count), data["enclosure"], strict=True):
-        phase, x = scene.joint(z, i)
-        for held, value in zip(map(ball, row), (phase / scene.omega, x, arb(0)), strict=True):
-            if not held.contains(value):
-                raise Undecided("balls hold the joints")
-    if claims["admissible"] == "proved":
+    printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
+    scene, z = Box(data, [*printed, ball(s)]).proved().orbits(0)
+    for value, near, r in zip(z, printed, radius, strict=True):
+        positive(r - abs(value - near), "it lies in the box around the printed joints")
+    times = [value if k % 2 else value / scene.omega for k, value in enumerate(z)]
+    if not all(ball(v).contains(w) for v, w in zip(data["enclosure"], times, strict=True)):
+        raise Undecided("balls hold the joints")
+    if "unique" in claims:
+        Box(data, [*printed, ball(s)]).proved([*radius, arb(0)])
+    if "admissible" in claims:
         check_admissible(scene, z)
-    proved = [name for name in _STATED[:3] if claims[name] == "proved"]
-    return proved + check_multipliers(scene, data, z, claims["stable"])
+    trace, det, jury = scene.multipliers(z)
+    for room in jury if "stable" in claims else ():
+        positive(room, "the multipliers lie inside of the circle")
+    if "unstable" in claims:
+        positive(-min(jury, key=float), "a multiplier lies outside of the circle")
+    root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
+    found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
+    for disc, mu in zip(data["multipliers"], found, strict=bool(data["multipliers"])):
+        if not acb(ball(disc["re"]), ball(disc["im"])).contains(mu):
+            raise Undecided("the multipliers lie in their discs")
+    return [c for c in CLAIMS if c in claims] + ["multipliers"] * bool(data["multipliers"])
 
 
-CHECKS = {"orbit": _check_orbit}
+CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}

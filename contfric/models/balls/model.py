@@ -49,6 +49,8 @@ class BallModel:
     alike : callable or None
         Returns the surface whose row is the rate of another one along a mode, or its negative, identically in
         the parameters: balls of the two rows do not show it.
+    unscaled : dict
+        Fields that are these but for a positive factor of the states, and without its rounding; if there are.
     """
 
     states: int
@@ -60,6 +62,7 @@ class BallModel:
     resets: dict[str, arb_mat] = field(default_factory=dict)
     slopes: BallModel | None = None
     alike: Callable[[str, str], str | None] | None = None
+    unscaled: dict[str, arb_mat] = field(default_factory=dict)
 
     @cached_property
     def rows(self) -> dict[str, Vector]:
@@ -71,13 +74,16 @@ class BallModel:
         return {}
 
     def rate(self, surface: str, mode: str, order: int = 1) -> Vector:
-        """Return the row of a derivative of a surface's observable along a mode; always the same list."""
+        """Return the row of a derivative of a surface's observable along a mode; always the same list.
+
+        It is by unscaled time, if there is one: it vanishes where that by the time of the model does.
+        """
         if order == 0:
             return self.rows[surface]
         key = (surface, mode, order)
         if key not in self._rates:
             below = arb_mat([self.rate(surface, mode, order - 1)])
-            self._rates[key] = numbers(below * self.fields[mode])
+            self._rates[key] = numbers(below * (self.unscaled or self.fields)[mode])
         return self._rates[key]
 
     @property

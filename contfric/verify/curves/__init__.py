@@ -1,1 +1,0 @@
-"""Curves of orbits, their events and tubes: a second program, on top of the checker of orbits."""

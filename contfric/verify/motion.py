@@ -1,0 +1,162 @@
+"""The motion: x'' + 2 zeta x' + x = f(t) - s S while s = sgn x' is not 0, x' = 0 while |x - f| <= S0.
+
+A slide is ``x = -s S + (x_0 + s S) C + r``, ``C = D' + 2 zeta D``, D = exp[l1, l2] a divided difference of
+exp(l tau) at the free exponents; a wave a cos(w t) adds ``Re a exp(i w t_0) exp[l1, l2, i w]`` to r.
+Nothing is divided by 0 at resonance. By its start ``dx/dx_0 = C`` and ``dx/dt_0 = -x''_0 D``.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from flint import acb, acb_series, arb, arb_series
+
+#: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
+SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
+PARAMETERS, J = ("Omega", "S", "S0", "h", "zeta"), acb(0, 1)
+_NUMBER = r"\d{1,99}([.]\d{1,99})?(e[+-]?\d{1,4})?"
+
+
+class Refused(Exception):
+    """A statement is false, or the file states nothing that can be checked: no precision helps."""
+
+
+class Undecided(Exception):
+    """The balls are too wide for a decision: more bits may help."""
+
+
+def ball(value: Any) -> arb:
+    """Return a number of a file, or the ball of a text such as ``1.25 +/- 1e-30``."""
+    text = isinstance(value, str) and re.fullmatch(f"(-?{_NUMBER} )?[+]/- {_NUMBER}", value)
+    if not text and (type(value) not in (int, float) or not arb(value).is_finite()):
+        raise Refused(f"{str(value)[:40]!r} is no number, and no ball such as '1.25 +/- 1e-30'")
+    return arb(value)
+
+
+def positive(value: arb, what: str) -> None:
+    """Go on if all numbers of a ball are above 0; refuse if none is."""
+    if not value > 0:
+        raise Refused(f"false: {what}") if value <= 0 else Undecided(what)
+
+
+def part(value: Any, k: int) -> arb:
+    """Return a coefficient of a power series; a ball is a constant."""
+    return value[k] if isinstance(value, arb_series) else arb(0 if k else value)
+
+
+def real(value: Any) -> Any:
+    """Return the real part of a ball or a series."""
+    return value.real if isinstance(value, acb) else arb_series([c.real for c in value])
+
+
+def sinc(x: Any) -> Any:
+    """Return sin(x) / x, also at 0: there by the derivatives of 0F1(3/2, -x^2 / 4)."""
+    if isinstance(x, acb) or 0 not in x[0]:
+        return x.sinc() if isinstance(x, acb) else x.sin() / x
+    q = -x * x / 4
+    terms = (q[0].hypgeom_0f1(1.5 + k) * (q - q[0]) ** k / (1, 1.5, 7.5)[k] for k in range(3))
+    return sum(terms, 0 * x)
+
+
+class Scene:
+    """The parameters and segments of a file, and their motion; joints are (phase of the excitation, x)."""
+
+    def __init__(self, data: dict[str, Any], value: Any) -> None:
+        periods, self.half = data["periods"], data["half"]
+        possible = type(periods) is int and self.half in (False, periods % 2 == 1) and periods > 0
+        if not possible or {*data["params"], data["parameter"]} != set(PARAMETERS):
+            raise Refused("its parameters, periods and symmetry are not those of a periodic orbit")
+        p = {name: ball(given) for name, given in data["params"].items()}
+        self.value = p[data["parameter"]] = value
+        self.omega, self.s, self.s0, h, self.zeta = (p[name] for name in PARAMETERS)
+        omega, s, s0 = (part(v, 0) for v in (self.omega, self.s, self.s0))
+        if not (omega > 0 and s >= 0 and s0 >= s):
+            raise Undecided("Omega > 0, S0 >= S >= 0")
+        self.waves = [(1, arb(1), self.omega), (3, h, 3 * self.omega)][: 1 if h == 0 else 2]
+        kind = acb if isinstance(self.zeta, arb) else acb_series
+        self.root = kind(self.zeta * self.zeta - 1).sqrt()
+        self.turn, self.closing = periods * arb.pi() * (1 if self.half else 2), 1 - 2 * self.half
+        self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]
+        self.count = len(self.segments)
+
+    def force(self, phase: Any, order: int = 0) -> Any:
+        """Return f or one of two derivatives of it by time."""
+        waves = [a * w**order * (k * phase).sin_cos()[order != 1] for k, a, w in self.waves]
+        return sum(waves[1:], waves[0]) * (-1 if order else 1)
+
+    def state(self, z: list[Any], i: int, tau: Any) -> tuple[Any, Any, Any, Any]:
+        """Return x with two derivatives some time after a segment begins, and C, C', D, D' of a slide."""
+        (phase, x), (direction, _) = self.joint(z, i), self.segments[i]
+        if not direction:
+            return x, 0 * x, 0 * x, ()
+        angle, decay, offset = J * self.root * tau, (-self.zeta * tau).exp(), -direction * self.s
+        sine = tau * sinc(angle) if part(self.zeta, 0) == 1 else angle.sin() / (J * self.root)
+        d = decay * real(sine)
+        rate = decay * real(angle.cos()) - self.zeta * d
+        c = rate + 2 * self.zeta * d
+        y, v = offset + (x - offset) * c, (offset - x) * d
+        first, last = self.root - self.zeta, -self.root - self.zeta
+        for k, amplitude, w in self.waves:
+            near = tau * ((first + J * w) * tau / 2).exp() * sinc((J * first + w) * tau / 2)
+            both, turn = (near - d) / (J * w - last), amplitude * (J * k * phase).exp()
+            y += real(turn * both)
+            v += real(turn * (last * both + near))
+        a = self.force(phase + self.omega * tau) - y - 2 * self.zeta * v + offset
+        return y, v, a, (c, -d, d, rate)
+
+    def observed(self, z: list[Any], i: int, name: str, tau: Any) -> tuple[Any, Any, Any]:
+        """Return v, or the load less its limit (F+, F-), with two derivatives."""
+        (y, v, a, _), end = self.state(z, i, tau), self.joint(z, i)[0] + self.omega * tau
+        first = v - self.force(end, 1)
+        if name == "v":
+            return v, a, -first - 2 * self.zeta * a
+        load = y - self.force(end) + (-self.s0 if name == "F+" else self.s0)
+        return load, first, a - self.force(end, 2)
+
+    def joint(self, z: list[Any], i: int) -> tuple[Any, Any]:
+        """Return joint i, the last one by periodicity or symmetry."""
+        if i < self.count:
+            return z[2 * i], z[2 * i + 1]
+        return z[0] + self.turn, self.closing * z[1]
+
+    def duration(self, z: list[Any], i: int) -> Any:
+        """Return how long segment i lasts."""
+        return (self.joint(z, i + 1)[0] - self.joint(z, i)[0]) / self.omega
+
+    def segment(self, z: list[Any], i: int) -> tuple[list[Any], Any, Any]:
+        """Return what vanishes for a segment, with its derivatives by the joints at its start and its end."""
+        (phase, x), (end, y), tau = self.joint(z, i), self.joint(z, i + 1), self.duration(z, i)
+        direction, side = self.segments[i]
+        if not direction:
+            load, slope = y - self.force(end), -self.force(end, 1) / self.omega
+            return [y - x, load - side * self.s0], ((0, -1), (0, 0)), ((0, 1), (slope, 1))
+        reached, v, last, (c, dc, d, dd) = self.state(z, i, tau)
+        first = (self.force(phase) - x - direction * self.s) / self.omega
+        after = (v / self.omega, -1), (last / self.omega, 0)
+        return [reached - y, v], ((-first * d, c), (-first * dd, dc)), after
+
+    def equations(self, z: list[Any]) -> tuple[list[Any], list[list[Any]]]:
+        """Return what vanishes for a solution, and its Jacobian, two rows a segment."""
+        values, rows = list[Any](), list[list[Any]]()
+        for i in range(self.count):
+            found, own, after = self.segment(z, i)
+            closing, k = self.closing if i + 1 == self.count else 1, (2 * i + 2) % (2 * self.count)
+            values += found
+            for start, (by_phase, by_x) in zip(own, after, strict=True):
+                rows.append([0] * (2 * i) + [*start] + [0] * (2 * (self.count - i - 1)))
+                rows[-1][k] += by_phase
+                rows[-1][k + 1] += by_x * closing
+        return values, rows
+
+    def multipliers(self, z: list[Any]) -> tuple[Any, Any, tuple[Any, Any, Any]]:
+        """Return trace and determinant of a turn, and what vanishes at a multiplier 1, -1, a pair (Jury)."""
+        columns, det = [(arb(1), arb(0)), (arb(0), arb(1))], arb(self.closing)
+        for i in range(self.count):
+            _, ((p, q), (r, s)), ((a, b), (c, d)) = self.segment(z, i)
+            size = a * d - b * c
+            moved = [(p * x + q * y, r * x + s * y) for x, y in columns]
+            columns = [((b * y - d * x) / size, (c * x - a * y) / size) for x, y in moved]
+            det *= (p * s - q * r) / size  # 0 after rest, which leaves one multiplier only
+        trace = columns[0][0] + self.closing * columns[1][1]
+        return trace, det, (1 - trace + det, 1 + trace + det, 1 - det)
