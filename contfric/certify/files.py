@@ -66,9 +66,9 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
         "segments": [list(pair) for pair in orbit.system.itinerary],
-        "joints": orbit.joints.tolist(),
-        "radius": [radii[i : i + m] for i in range(0, len(radii), m)],
-        "enclosure": [balls[i : i + m] for i in range(0, len(balls), m)],
+        "joints": unknowns_of(orbit.joints.ravel().tolist()),
+        "radius": radii,
+        "enclosure": balls,
         "multipliers": multipliers,
         "statements": statements,
     }
@@ -134,7 +134,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
         "segments": [list(pair) for pair in orbit.system.itinerary],
-        "near": [balls[i : i + m] for i in range(0, len(balls), m)],
+        "knots": [[*unknowns_of(knot[:-1]), knot[-1]] for knot in knots],
         "at": at,
     }
 

@@ -65,8 +65,100 @@ class _Run:
     start : its first knot
     until : when to end, by ``time.time``
     """
-    branch = proof.branch
-    size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
+
+    def __init__(self, data: dict[str, Any], start: _Row, until: float) -> None:
+        self.data, self.until = data, until
+        self.rows, self.kinds, self.ends = [start], list[list[str]](), list[Any]([None, None])
+        self.point: Box | None = None
+        self.tried, self.length, self.steady, self.why = 0, math.inf, _STEADY, ""
+
+    def may_try(self) -> bool:
+        """Tell whether there is time for another box; else say what ended the work."""
+        if self.tried < _MOST and time.time() < self.until:
+            return True
+        self.why = f"{_MOST} boxes were tried" if self.tried >= _MOST else "the time limit ended it"
+        return False
+
+    def step(self, row: _Row, end: Any = None) -> bool:
+        """Go on to a knot, or to an end before it, in one box; else say why not."""
+        if not self.may_try():
+            return False
+        self.tried += 1
+        known = [self.point] if self.point else []
+        try:
+            first, last = orbits_at(self.data | {"knots": [self.rows[-1], row]}, known)
+            kinds, _ = events_between(self.data, first, last, end)
+            if end:
+                check_admissible(*first.orbits(0))
+        except (Refused, Undecided, ArithmeticError, ValueError) as error:
+            self.why = str(error)
+            return False
+        self.kinds.append([kind for kind in kinds if not end or kind != end[0]])
+        self.rows.append(row)
+        self.point, self.why = last, ""
+        return True
+
+    def march(self, row: _Row) -> bool:
+        """Go on to a knot in as many boxes as it takes; tell whether it is reached."""
+        start, whole, done = self.rows[-1], math.dist(self.rows[-1], row), 0.0
+        while done < 1:
+            # not two because one would be a little too long
+            boxes = math.ceil(min((1 - done) * whole / self.length - 0.1, 2**_HALVINGS)) or 1
+            there = done + (1 - done) / boxes if boxes > 1 else 1.0
+            length = (there - done) * whole
+            if self.step(_between(start, row, there)):
+                done, self.steady = there, self.steady + 1
+                self.length *= _GROWTH if self.steady > _STEADY else _SLOW
+            elif length * 2**_HALVINGS < whole or not self.may_try():
+                return False
+            else:
+                self.length, self.steady = length * (_SHORTER if self.steady else 0.5), 0
+        return True
+
+    def finish(self, row: _Row, end: Any) -> bool:
+        """Go on to an end of the branch before a knot."""
+        for _ in range(_END_HALVINGS):
+            if self.step(row, end):
+                return True
+            middle = _between(self.rows[-1], row)
+            if not self._obeys(middle, row):
+                row = middle
+            elif not self.march(middle):
+                return False
+        return False
+
+    def _obeys(self, row: _Row, other: _Row) -> bool:
+        """Tell whether the orbit at a knot is admissible."""
+        try:
+            (_, point) = orbits_at(self.data | {"knots": [other, row]})
+            check_admissible(*point.orbits(0))
+        except (Refused, Undecided, ArithmeticError, ValueError):
+            return False
+        return True
+
+    def turned(self) -> _Run:
+        """Return the same tube in the other direction."""
+        run = _Run(self.data, self.rows[-1], self.until)
+        run.rows, run.kinds = self.rows[::-1], self.kinds[::-1]
+        run.ends, run.tried, run.length = self.ends[::-1], self.tried, self.length
+        _, run.point = orbits_at(self.data | {"knots": run.rows[-2:]})
+        return run
+
+
+def _between(a: _Row, b: _Row, share: float = 0.5) -> _Row:
+    return [x + share * (y - x) for x, y in zip(a, b, strict=True)] if share < 1 else b
+
+
+def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str, Any]]:
+    """Return the tubes along a branch as plain data: one for each run of boxes that the checker decides.
+
+    There are none if the checker does not know the model, or the orbits have holds.
+
+    Parameters
+    ----------
+    until : when to end, by ``time.time``; the last tube ends there
+    """
+    branch, cap = proof.branch, ctx.cap
     if branch.model.name not in CHECKED_MODELS or branch.system.holds:
         return []
     ctx.cap = 3
@@ -124,10 +216,10 @@ def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
         "periods": branch[0].periods,
         "half": bool(system.half),
         "segments": [list(pair) for pair in system.itinerary],
-        "knots": [knot[columns].tolist() for knot in knots],
-        "events": events,
-        "ends": ends,
-        "unchecked": _UNCHECKED,
+        "knots": run.rows if run else [],
+        "events": [[k, kind] for k, found in enumerate(kinds) for kind in found],
+        "ends": run.ends if run else [None, None],
+        "unchecked": _UNCHECKED + (f"; it goes no further: {run.why}" if run and run.why else ""),
     }
 
 

@@ -114,7 +114,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
         ),
     ],
 )
-def test_what_cannot_be_fitted_is_said(change: dict[str, Any], itineraries: str) -> None:
+def test_what_cannot_be_fitted_is_said(change: dict[str, Any], words: str) -> None:
     asked: dict[str, Any] = {
         "model": "coulomb",
         "data": [cf.Measured("x_max", 1.42, 0.01, {"Omega": 0.5})],
@@ -125,7 +125,7 @@ def test_what_cannot_be_fitted_is_said(change: dict[str, Any], itineraries: str)
         asked["data"] = [cf.Series("x", [0.0], [1.0], 0.1)]
     with pytest.raises(cf.ContfricError) as caught:
         cf.fit(**{**asked, **change})
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -137,10 +137,10 @@ def test_what_cannot_be_fitted_is_said(change: dict[str, Any], itineraries: str)
         (lambda: cf.Series("x", [0.0], [np.nan], 0.1), "values of a series are finite numbers"),
     ],
 )
-def test_what_is_no_measurement_is_said(make: Any, itineraries: str) -> None:
+def test_what_is_no_measurement_is_said(make: Any, words: str) -> None:
     with pytest.raises(cf.ParameterError) as caught:
         make()
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 def places(params: dict[str, float]) -> dict[str, cf.Bifurcation]:

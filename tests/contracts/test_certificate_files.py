@@ -23,7 +23,7 @@ from contfric.certify.orbit import certify_orbit
 from contfric.cli import main
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.verify.curves.file import check_text
+from contfric.verify.file import check_text
 from tests.certificate_oracle import false_statements, mutated
 
 CHECKER = Path(cf.__file__).parent / "verify"

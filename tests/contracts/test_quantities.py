@@ -55,10 +55,10 @@ def test_the_list_of_names_is_one() -> None:
         (3, "a quantity is a name, an expression such as"),
     ],
 )
-def test_a_mistake_is_said(orbit: cf.Orbit, name: Any, itineraries: str) -> None:
+def test_a_mistake_is_said(orbit: cf.Orbit, name: Any, words: str) -> None:
     with pytest.raises(cf.ContfricError) as caught:
         orbit.quantity(name)
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -184,12 +184,12 @@ def test_a_file_declares_quantities(tmp_path: Path) -> None:
         ("size: rms(x, 2)", "13: rms() is such as rms(x)"),
     ],
 )
-def test_a_mistake_in_a_file_has_its_line(tmp_path: Path, entry: str, itineraries: str) -> None:
+def test_a_mistake_in_a_file_has_its_line(tmp_path: Path, entry: str, words: str) -> None:
     path = tmp_path / "damped.yaml"
     path.write_text(f"{MODEL}  {entry}\n", encoding="utf-8")
     with pytest.raises(ModelError) as caught:
         cf.load_model(path)
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 # ----------------------------------------------------------------------------- where branches end
@@ -278,10 +278,10 @@ def test_a_diagram_stops_at_the_same_orbits_for_either_mirror_image(
         ({"stops": 1.4}, "takes a quantity that is one number"),
     ],
 )
-def test_what_cannot_be_stopped_at_is_said(orbit: cf.Orbit, stop_at: Any, itineraries: str) -> None:
+def test_what_cannot_be_stopped_at_is_said(orbit: cf.Orbit, stop_at: Any, words: str) -> None:
     with pytest.raises(ParameterError) as caught:
         cf.continue_orbit(orbit, "Omega", (0.4, 0.6), stop_at=stop_at)
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 STUDY = """\
@@ -318,14 +318,12 @@ def test_a_study_asks_for_quantities(tmp_path: Path) -> None:
         ("x_max: 1.43", "x_max: big", "5: 'stop_at' must be a mapping of quantities"),
     ],
 )
-def test_a_mistake_in_a_study_has_its_line(
-    tmp_path: Path, old: str, new: str, itineraries: str
-) -> None:
+def test_a_mistake_in_a_study_has_its_line(tmp_path: Path, old: str, new: str, words: str) -> None:
     path = tmp_path / "study.yaml"
     path.write_text(STUDY.replace(old, new), encoding="utf-8")
     with pytest.raises(cf.StudyError) as caught:
         cf.run_study(path, out=tmp_path / "out")
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_an_event_from_a_file_knows_its_parameter(branch: cf.Branch, tmp_path: Path) -> None:
@@ -365,12 +363,12 @@ def test_a_curve_of_a_quantity_is_a_table_and_a_figure(orbit: cf.Orbit) -> None:
         ({"quantity": "S0", "value": 0.4}, "it may not depend on Omega and S, or be extreme there"),
     ],
 )
-def test_a_curve_that_cannot_be_says_why(orbit: cf.Orbit, change: Any, itineraries: str) -> None:
+def test_a_curve_that_cannot_be_says_why(orbit: cf.Orbit, change: Any, words: str) -> None:
     asked = {"orbit": orbit, "quantity": "x_max", "value": 1.41, "parameters": ("Omega", "S")}
     asked["ranges"] = {"Omega": (0.48, 0.52), "S": (0.3, 0.34)}
     with pytest.raises(cf.ContfricError) as caught:
         cf.continue_quantity(**{**asked, **change})
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)
 
 
 def test_curves_of_quantities_are_saved(orbit: cf.Orbit, tmp_path: Path) -> None:
@@ -405,10 +403,10 @@ def test_curves_of_quantities_are_saved(orbit: cf.Orbit, tmp_path: Path) -> None
     ],
 )
 def test_a_curve_of_extrema_that_cannot_be_says_why(
-    orbit: cf.Orbit, change: Any, itineraries: str
+    orbit: cf.Orbit, change: Any, words: str
 ) -> None:
     asked = {"start": orbit, "quantity": "x_max", "parameters": ("Omega", "S")}
     asked["ranges"] = {"Omega": (0.48, 0.52), "S": (0.3, 0.34)}
     with pytest.raises(cf.ContfricError) as caught:
         cf.continue_extremum(**{**asked, **change})
-    assert itineraries in str(caught.value)
+    assert words in str(caught.value)

@@ -80,7 +80,7 @@ def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
         (None, RANGES, "a stable set is one of an Orbit, got None"),
     ],
 )
-def test_what_has_none_says_why(orbit: str | None, ranges: Any, itineraries: str) -> None:
+def test_what_has_none_says_why(orbit: str | None, ranges: Any, words: str) -> None:
     start: Any = None if orbit is None else cf.solve_orbit("coulomb", orbit, PARAMS)
     with pytest.raises(cf.ParameterError) as caught:
         cf.stable_set(start, ranges)

@@ -174,21 +174,6 @@ def test_a_part_of_a_tube_is_one(tmp_path: Path) -> None:
     assert verify(path).yes
 
 
-def _by_hand(params: dict[str, float], parameter: str, span: tuple[float, float]) -> dict[str, Any]:
-    """Return a tube through all printed orbits of a branch, which no prover has seen."""
-    branch = cf.continue_orbit(cf.find_orbit("coulomb", params), parameter, span)
-    rows = [[*point.joints[:, :2].ravel().tolist(), point.params[parameter]] for point in branch]
-    return fold() | {
-        "params": dict(branch[0].params),
-        "parameter": parameter,
-        "half": bool(branch.system.half),
-        "segments": [list(pair) for pair in branch.system.itinerary],
-        "knots": rows,
-        "events": [],
-        "ends": [None, None],
-    }
-
-
 def test_a_tube_passes_resonance_without_damping() -> None:
     orbit = cf.find_orbit("coulomb", {"Omega": 1.0, "S": 0.9, "S0": 0.9})
     found = tubes_of(certify_branch(cf.continue_orbit(orbit, "Omega", (0.998, 1.002))))
