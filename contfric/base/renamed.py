@@ -11,12 +11,11 @@ def renamed(old: str, new: str) -> property:
 
     Examples
     --------
-    >>> class Orbit:
-    ...     itinerary = ("stick",)
-    ...     word = renamed("word", "itinerary")
     >>> import warnings
-    >>> with warnings.catch_warnings(record=True) as told:
-    ...     Orbit().word
+    >>> Named = type("Named", (), {"itinerary": ("stick",), "word": renamed("word", "itinerary")})
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     Named().word
     ('stick',)
     """
 

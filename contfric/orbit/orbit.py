@@ -289,10 +289,8 @@ class Orbit(MeasuredOrbit):
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
-        lasts, short = (
-            self.ends[:, 0] - self.cycle[:, 0],
-            no_time(self.system, self.joints, margins),
-        )
+        lasts = self.ends[:, 0] - self.cycle[:, 0]
+        short = no_time(self.system, self.joints, margins)
         inside = np.all(margins > margin_slack(self.system, self.joints)) and np.all(lasts > -short)
         return bool(self.converged and fine and inside)
 

@@ -118,7 +118,7 @@ MISTAKES = [
     ("S: 0.2", "S: '1e-2'", 5, "a number has no quotes"),
     ("default: 0.5", "defualt: 0.5", 4, "did you mean 'default'?"),
     ("S: 0.2", "sin: 0.2", 5, "means a function"),
-    ("S: 0.2", "lambda: 0.2", 5, "itinerary of Python"),
+    ("S: 0.2", "lambda: 0.2", 5, "word of Python"),
     ("S: 0.2", "x: 0.2", 5, "has the name of a state"),
     ("Omega > 0, S", "Omega > 0, S*S", 6, "must be linear"),
     ("Omega > 0, S", "Omega < 0 < S, S", 6, "a constraint is such as"),
