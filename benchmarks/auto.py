@@ -114,7 +114,7 @@ def measured(program: Path) -> tuple[dict[str, Series], float]:
 def page(found: dict[str, Series], yard: float, commit: str) -> str:
     """Return the page."""
     lines = [
-        "# Beside AUTO-07p",
+        "# Against AUTO-07p",
         "",
         f"Written by `benchmarks/auto.py` at commit {commit}; the yardstick of the machine (`make gate`) "
         f"takes {yard * 1e3:.2f} ms. Medians of {ROUNDS} turns, processor time; AUTO's start is taken off. "

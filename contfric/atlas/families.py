@@ -14,8 +14,7 @@ from contfric.atlas.matching import SAME_MOTION, stops_apart
 from contfric.continuation.candidates import candidates
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import TERMINAL, End, Kind, Verdict
-from contfric.continuation.points import Settings
-from contfric.continuation.switching import settings_value
+from contfric.continuation.points import Settings, next_to
 from contfric.continuation.trace import follow_family
 from contfric.continuation.vertical import family_near
 from contfric.orbit.orbit import Orbit
@@ -71,10 +70,10 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
         if candidate.orbit is None or candidate.has_hold:
             continue
         for share in _BOTH:
-            beside = _beside_family(state, candidate.orbit, share)
-            if beside is None or state.known(beside) is not None:
+            near = _beside_family(state, candidate.orbit, share)
+            if near is None or state.known(near) is not None:
                 continue
-            branch = whole_branch(shortest(beside), state.settings)
+            branch = whole_branch(shortest(near), state.settings)
             ends = [end for end in branch.ends if meets(end, event, state.settings)]
             if ends and not fault_of(branch):
                 state.accept(event, candidate.reason, branch)
@@ -88,13 +87,9 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
     The two lines are two lengths of the segment that vanishes, in proportion to the distance: if the one that
     Newton finds is negative the other one is looked for from a segment that is longer.
     """
-    settings = state.settings
-    value = settings_value(orbit, settings) + share * settings.width
-    if not settings.low <= value <= settings.high:
+    guess = next_to(orbit, state.settings, share)
+    if guess is None:
         return None
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = value
-    guess = Orbit(orbit.system, orbit.joints, vector, np.inf)
     found = refine(guess)
     lasts = found.ends[:, 0] - found.cycle[:, 0]
     k = int(np.argmin(lasts))

@@ -12,8 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from contfric.atlas.collect import Event
 from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
@@ -43,10 +41,7 @@ from contfric.continuation.events import (
 )
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
-from contfric.continuation.points import Settings
-from contfric.continuation.switching import (
-    settings_value,
-)
+from contfric.continuation.points import Settings, next_to
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
@@ -305,15 +300,8 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     """Return the branch through an orbit at which it may be singular, from just next to it."""
     settings = state.settings
-    value = settings_value(orbit, settings)
-    active = orbit.model.index_of(settings.parameter)
-    for share in SHARES:
-        beside = value + share * settings.width
-        if not settings.low <= beside <= settings.high:
-            continue
-        vector = orbit.vector.copy()
-        vector[active] = beside
-        solved = refine(Orbit(orbit.system, orbit.joints, vector, np.inf))
+    guesses = (next_to(orbit, settings, share) for share in SHARES)
+    for solved in (refine(guess) for guess in guesses if guess is not None):
         if solved.converged and solved.admissible:
             return whole_branch(shortest(solved), settings)
     return None

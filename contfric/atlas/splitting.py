@@ -11,8 +11,8 @@ from contfric.atlas.crossings import whole_branch
 from contfric.atlas.departures import ends_at
 from contfric.atlas.exploration import Exploration
 from contfric.continuation.events import Kind, Verdict
+from contfric.continuation.points import next_to
 from contfric.continuation.split_touch import pinned_first, splits
-from contfric.continuation.switching import settings_value
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
@@ -42,11 +42,8 @@ def follow_split(state: Exploration, event: Event) -> bool:
 
 def _beside(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
     """Return the orbit of the same itinerary at a parameter next to the event, pinned to the first touch."""
-    settings = state.settings
-    value = settings_value(orbit, settings) + share * settings.width
-    if not settings.low <= value <= settings.high:
+    guess = next_to(orbit, state.settings, share)
+    if guess is None:
         return None
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = value
-    solved = refine(pinned_first(orbit, vector))
+    solved = refine(pinned_first(orbit, guess.vector))
     return shortest(solved) if solved.converged and solved.admissible else None

@@ -134,7 +134,7 @@ class _Census:
     catalogue: Catalogue = field(default_factory=Catalogue)
     itineraries: list[ReducedItinerary] = field(default_factory=list)
     fates: dict[tuple[ReducedItinerary, int], Fate | None] = field(default_factory=dict)
-    walked: set[ReducedItinerary] = field(default_factory=set)
+    followed: set[ReducedItinerary] = field(default_factory=set)
     searches: list[SectionSearch] = field(default_factory=list)
     interrupted: bool = False
 
@@ -183,7 +183,7 @@ class _Census:
         for codes in found.walks:
             itinerary = grid.itinerary_of(codes)
             half = codes[-1] != grid.own
-            self.walked.add(canonical_pair(self.model, whole_of(self.model, itinerary, half)))
+            self.followed.add(canonical_pair(self.model, whole_of(self.model, itinerary, half)))
         self.searches.append(
             SectionSearch(
                 str(grid.section),
@@ -227,5 +227,5 @@ class _Census:
         if found:
             fate = Fate.FOUND
         elif fate is None:
-            fate = Fate.NOT_CLOSED if itinerary in self.walked else Fate.NOT_WALKED
+            fate = Fate.NOT_CLOSED if itinerary in self.followed else Fate.NOT_WALKED
         return Walk(itinerary, periods, fate, found)

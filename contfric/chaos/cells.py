@@ -301,7 +301,7 @@ def follow_cells(  # type: ignore[no-untyped-def]
     """Follow motions from ``states`` at ``time``, and fill the rows.
 
     Some are followed side by side, segment by segment; where one ends the next cell takes its place. What a
-    cell comes to depends on nothing beside it.
+    cell comes to does not depend on the others.
 
     Parameters
     ----------

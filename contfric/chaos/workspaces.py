@@ -49,9 +49,9 @@ def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
     walk, state, memory, averages = new_walk(n), state_workspace(n), new_memory(n), new_averages(n)
     return CellWorkspaces(
         Walk(
-            beside(width, walk.y),
+            as_many(width, walk.y),
             walk.start,
-            beside(width, walk.jac),
+            as_many(width, walk.jac),
             walk.grad,
             walk.end,
             walk.image,
@@ -60,31 +60,31 @@ def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
             np.full(width, SINGLY),
         ),
         StateWorkspace(
-            state.none, state.empty, state.nothing, beside(width, state.after), state.trial
+            state.none, state.empty, state.nothing, as_many(width, state.after), state.trial
         ),
         np.empty((width, n, n + 1)),
         np.empty(n),
         Memory(
-            beside(width, memory.key),
-            beside(width, memory.cycle),
-            beside(width, memory.event),
-            beside(width, memory.span),
-            beside(width, memory.z),
-            beside(width, memory.near),
+            as_many(width, memory.key),
+            as_many(width, memory.cycle),
+            as_many(width, memory.event),
+            as_many(width, memory.span),
+            as_many(width, memory.z),
+            as_many(width, memory.near),
         ),
         Averages(
-            beside(width, averages.growth),
-            beside(width, averages.time),
-            beside(width, averages.size),
-            beside(width, averages.pending),
-            beside(width, averages.place),
+            as_many(width, averages.growth),
+            as_many(width, averages.time),
+            as_many(width, averages.size),
+            as_many(width, averages.pending),
+            as_many(width, averages.place),
         ),
         new_cycle_workspace(n),
     )
 
 
 @allocating_helper
-def beside(width, array):  # type: ignore[no-untyped-def]
+def as_many(width, array):  # type: ignore[no-untyped-def]
     """Return space for as many arrays like one."""
     return np.empty((width, *array.shape), array.dtype)
 

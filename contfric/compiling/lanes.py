@@ -3,7 +3,7 @@
 Loops are compiled as they stand, and not put into vectors (:mod:`contfric.compiled`); a search of roots is no
 loop that a compiler would find, either. ``Lanes`` holds a number of each of :data:`LANES` motions. Arithmetic
 with it, and with plain numbers, acts on each by itself and is rounded as it would be alone, so that a result
-does not depend on which motions stand beside it.
+does not depend on which motions stand next to it.
 """
 
 from __future__ import annotations

@@ -255,6 +255,16 @@ class Rows:
         self.mu[k], self.arc[k] = point.mu, point.arc
 
 
+def next_to(orbit: Orbit, settings: Settings, share: float) -> Orbit | None:
+    """Return an orbit, not solved, at a value this share of the range away; None outside of the range."""
+    active = orbit.model.index_of(settings.parameter)
+    vector = orbit.vector.copy()
+    vector[active] += share * settings.width
+    if not settings.low <= vector[active] <= settings.high:
+        return None
+    return Orbit(orbit.system, orbit.joints, vector, np.inf)
+
+
 def settings_of(
     orbit: Orbit,
     parameter: str,

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from contfric.continuation.continuum import LEVEL, in_continuum
-from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.points import EXTRA, Point, Settings, next_to
 from contfric.continuation.side import first_point
 from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError
@@ -77,17 +75,11 @@ def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, 
     """
     if not _is_at_event(start, settings):
         return orbit, start
-    active = orbit.model.index_of(settings.parameter)
-    for share in _BESIDE_START:
-        value = start.value + share * settings.width
-        if not settings.low <= value <= settings.high:
-            continue
-        vector = orbit.vector.copy()
-        vector[active] = value
-        beside = refine(replace(orbit, vector=vector))
-        point = first_point(beside, settings) if beside.converged and beside.admissible else None
+    guesses = (next_to(orbit, settings, share) for share in _BESIDE_START)
+    for near in (refine(guess) for guess in guesses if guess is not None):
+        point = first_point(near, settings) if near.converged and near.admissible else None
         if point is not None and not _is_at_event(point, settings):
-            return beside, point
+            return near, point
     return orbit, start
 
 

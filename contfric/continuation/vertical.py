@@ -149,11 +149,11 @@ def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> Family | Non
     if joints is None:
         return None
     residual, _, _ = equations_at(whole.system, joints, whole.vector)
-    if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 beside an orbit of a family
+    if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 near an orbit of a family
         return None
     for distance in _INSIDE:
-        beside = replace(whole, joints=whole.joints + distance * along)
-        found = _at_value(beside, active)
+        moved = replace(whole, joints=whole.joints + distance * along)
+        found = _at_value(moved, active)
         if found is not None and found.orbit.admissible and not found.orbit.symmetric:
             return found if found.missed < _MISSED else None
     return None

@@ -89,7 +89,7 @@ def lay_out(ax: Axes) -> None:
         engine.execute(root)
 
 
-def settled(figure: Figure) -> bool:
+def laid_out(figure: Figure) -> bool:
     """Tell whether a layout has moved the axes of a figure from where they were put."""
     for ax in figure.get_axes():
         spec = ax.get_subplotspec()

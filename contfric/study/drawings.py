@@ -122,14 +122,14 @@ def draw(path: Path, drawing: Drawing, found: Found, title: str) -> None:
 
     Matplotlib is loaded here, and only when a figure is drawn.
     """
-    from contfric.plot.labels import settled
+    from contfric.plot.labels import laid_out
     from contfric.plot.save import journal, new_figure, save_figure
 
     with nullcontext() if drawing.journal is None else journal(drawing.journal.value):
         look = FIGURES[drawing.kind][0]
         figure = new_figure(look.width, look.height + look.row_height * len(drawing.rows))
         drawing.task.draw(figure, drawing, found, "" if drawing.journal else title)
-        if settled(figure):  # for the labels; a second time costs 0.1 s
+        if laid_out(figure):  # for the labels; a second time costs 0.1 s
             figure.set_layout_engine("none")
         with replacing(path) as temporary:
             save_figure(figure, temporary)

@@ -47,7 +47,7 @@ class Box:
         for _ in range(1 if radii else 4):
             self.gap = 1 - size(1 - self.inverse * self.equations(INSIDE)[1])
             reached = self.radii - self.gap * self.radii + off
-            if all(room > 0 for room in (self.radii - reached).entries()):
+            if all(margin > 0 for margin in (self.radii - reached).entries()):
                 return self
             self.radii = size(1.5 * reached + least)
         raise Undecided("one orbit in a box")
@@ -86,8 +86,8 @@ class Box:
         scene, z = point.orbits(0)
         off = column([*z, scene.value]) - self.middle
         s = (self.border * off)[0, 0] / (self.border * self.along)[0, 0]
-        rooms = (self.radii - size(off - s * self.along)).entries()
-        return abs(s) < HALF and all(room > 0 for room in rooms)
+        margins = (self.radii - size(off - s * self.along)).entries()
+        return abs(s) < HALF and all(margin > 0 for margin in margins)
 
     def events(self, first: Box, last: Box) -> list[str]:
         """Return which multipliers pass the circle between two orbits, once each: their rates have a sign."""

@@ -122,8 +122,8 @@ def _check_orbit(data: Any) -> list[str]:
     if "admissible" in claims:
         check_admissible(scene, z)
     trace, det, jury = scene.multipliers(z)
-    for room in jury if "stable" in claims else ():
-        positive(room, "the multipliers lie inside of the circle")
+    for margin in jury if "stable" in claims else ():
+        positive(margin, "the multipliers lie inside of the circle")
     if "unstable" in claims:
         positive(-min(jury, key=float), "a multiplier lies outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2

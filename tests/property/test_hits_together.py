@@ -1,4 +1,4 @@
-"""First hits of many motions at once: those of each by itself, and bits that depend on nothing beside it."""
+"""First hits of many motions at once: those of each by itself, and bits that do not depend on the others."""
 
 import math
 

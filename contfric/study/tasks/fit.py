@@ -53,7 +53,7 @@ class DatumPart(Part):
         Raises
         ------
         ParameterError
-            If it is none, or several.
+            If there are none, or several.
         """
         given = [k for k in ("quantity", "series", "jump") if getattr(self, k) is not None]
         needs = "file" if given == ["series"] else "value"
