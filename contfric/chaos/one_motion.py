@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -76,39 +75,47 @@ def try_cycle(  # type: ignore[no-untyped-def]
     return True
 
 
-def carrying(with_resets: bool) -> Any:
-    """Return what carries the frame to the next joint, with or without what changes it there, as a helper.
+@helper
+def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
+    """Go on to the next joint, and carry the frame there.
 
-    Without is for models with excitation and no resets: the other one would cost them a tenth.
+    Returns
+    -------
+    tuple
+        (outcome, surface, mode that follows, duration, periods completed, phase, directions left).
     """
-
-    @helper
-    def carry(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
-        """Go on to the next joint, and carry the frame there.
-
-        (Outcome, surface, mode that follows, duration, periods completed, phase, directions left.)
-        """
-        walk, workspace = workspaces.walk, workspaces.state
-        outcome, surface, following, duration, turns, t = to_joint(
-            functions, tables, mode, on, t, p, period, walk, workspace
-        )
-        if outcome == ARRIVED:
-            observable = tables.observables[surface]
-            rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
-            live = min(live, ranks[mode])
-            push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
-            if with_resets:
-                reset = tables.bounds[mode, surface] == 2
-                if reset or walk.at_once[1] & 1 != 0:
-                    behind(functions, surface, t, p, workspaces.frame, live, walk, workspace, reset)
-            if not orthonormalise(workspaces.frame, live, workspaces.growth):
-                outcome = BROKEN
-        return outcome, surface, following, duration, turns, t, live
-
-    return carry
+    walk, workspace = workspaces.walk, workspaces.state
+    outcome, surface, following, duration, turns, t = to_joint(
+        functions, tables, mode, on, t, p, period, walk, workspace
+    )
+    if outcome == ARRIVED:
+        observable = tables.observables[surface]
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
+        live = min(live, ranks[mode])
+        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
+        if not orthonormalise(workspaces.frame, live, workspaces.growth):
+            outcome = BROKEN
+    return outcome, surface, following, duration, turns, t, live
 
 
-carry_on, carry_behind = carrying(False), carrying(True)
+@helper
+def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
+    """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
+    walk, workspace = workspaces.walk, workspaces.state
+    outcome, surface, following, duration, turns, t = to_joint(
+        functions, tables, mode, on, t, p, period, walk, workspace
+    )
+    if outcome == ARRIVED:
+        observable = tables.observables[surface]
+        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
+        live = min(live, ranks[mode])
+        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
+        reset = tables.bounds[mode, surface] == 2
+        if reset or walk.at_once[1] & 1 != 0:
+            behind(functions, surface, t, p, workspaces.frame, live, walk, workspace, reset)
+        if not orthonormalise(workspaces.frame, live, workspaces.growth):
+            outcome = BROKEN
+    return outcome, surface, following, duration, turns, t, live
 
 
 @helper
