@@ -268,7 +268,7 @@ def test_impact_with_friction_in_closed_form() -> None:
     x = 4 * FF / (1 + E) ** 2 - B
     fold = 8 * FF**2 / (speed_squared(x, B) + 8 * FF * x)
     assert value("impact-friction", "SN", 4.95) == pytest.approx(fold, abs=1e-11)
-    assert value("impact-friction", "SS", 5.2) == pytest.approx(FF / (1.0 - B), abs=1e-9)
+    assert value("impact-friction", "AS", 5.2) == pytest.approx(FF / (1.0 - B), abs=1e-9)
     assert [ss, fold] == pytest.approx([5.5730340399782, 4.9515355556113], abs=1e-12)
     (loose,) = diagram("impact-friction").loose_ends
     assert loose.end.reason is cf.EndReason.SS
