@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from chain import FloatArray
@@ -29,8 +29,8 @@ LIMIT, MOST_POINTS = 120.0, 200_000
 MOST_COMPARED = 300
 #: Ratio of the steps.
 FINER = 10.0
-#: Events are at one place if their parameters agree to this, relative to 1 + the parameter: what two
-#: brackets to rounding differ by, times the condition of all but the worst. SINGULAR ends (two
+#: Events are at one place if their parameters agree to what both say that they are accurate to, or to
+#: this, relative to 1 + the parameter: what two brackets to rounding differ by. SINGULAR ends (two
 #: conditions at once, a margin that vanishes quadratically) are good to the root of rounding, and
 #: UNBOUNDED ones stand where a step has passed a size.
 SAME, LOOSE = 1e-9, {"SINGULAR": 1e-6, "UNBOUNDED": 1e-6}
@@ -43,6 +43,12 @@ FAILURES = frozenset({"STEP", "BROKEN", "POINTS", "START", "INTERRUPTED"})
 #: Shortest branch that is retraced, in largest steps of the finer trace: below, it is one step long.
 SHORT = 3.0
 
+#: Least range of a branch's parameter, where it hardly changes along the branch (a family at Omega = 1/2):
+#: the rounding of the parameter, 1e-14, is then no more than what a point is good to.
+LEAST_RANGE = 1e-14 / SOLVED
+
+#: Kind of an event or end, where it is, and the accuracy that it states.
+Placed = tuple[str, float, float]
 Progress = Callable[[str], None] | None
 
 
@@ -123,10 +129,7 @@ def explored(
     names = [sorted(b.name for b in d.branches if not b.mirrored) for d in (diagram, fine)]
     text = f"{where}: {names[0]}, with smaller steps {names[1]}"
     tally.check("diagram: the same branches", itineraries[0] == itineraries[1], text)
-    pairs = [
-        [(b.kind.value, b.params[d.parameter]) for b in d.bifurcations] for d in (diagram, fine)
-    ]
-    differ = difference(*pairs)
+    differ = difference(*(_placed(d.bifurcations, d.parameter) for d in (diagram, fine)))
     tally.check("diagram: the same events", not differ, f"{where}: {differ}")
     for b in diagram.bifurcations:
         tally.met(f"event: {b.kind.value}{'' if b.located else ' (not located)'}")
@@ -149,7 +152,7 @@ def retraced(
         return
     differ = difference(_ends(branch), _ends(fine))
     tally.check("branch: the same ends", not differ, f"{where}: {differ}")
-    differ = difference(_events(branch), _events(fine))
+    differ = difference(*(_placed(b.bifurcations, branch.parameter) for b in (branch, fine)))
     tally.check("branch: the same events", not differ, f"{where}: {differ}")
     away, at = off(branch, fine)
     tally.check(
@@ -161,31 +164,37 @@ def retraced(
     tally.met("points compared", min(len(branch), MOST_COMPARED))
 
 
-def _events(branch: cf.Branch) -> list[tuple[str, float]]:
-    return [(b.kind.value, b.params[branch.parameter]) for b in branch.bifurcations]
+def _placed(events: Iterable[cf.Bifurcation], parameter: str) -> list[Placed]:
+    return [(b.kind.value, b.params[parameter], b.accuracy) for b in events]
 
 
-def _ends(branch: cf.Branch) -> list[tuple[str, float]]:
-    pairs = zip(branch.ends, (0, -1), strict=True)
-    return [(end.reason.name, float(branch.values[k])) for end, k in pairs]
+def _ends(branch: cf.Branch) -> list[Placed]:
+    return [
+        (
+            end.reason.name,
+            float(branch.values[k]),
+            end.bifurcation.accuracy if end.bifurcation is not None else 0.0,
+        )
+        for end, k in zip(branch.ends, (0, -1), strict=True)
+    ]
 
 
-def difference(a: list[tuple[str, float]], b: list[tuple[str, float]]) -> str:
+def difference(a: list[Placed], b: list[Placed]) -> str:
     """Return what is in one list and not at the same place in the other; empty if nothing."""
     left, missing = list(b), []
-    for kind, value in a:
-        near = LOOSE.get(kind, SAME)
+    for kind, value, accuracy in a:
+        near = LOOSE.get(kind, SAME) * (1.0 + abs(value))
         same = [
             k
-            for k, (other, there) in enumerate(left)
-            if other == kind and abs(there - value) <= near * (1.0 + abs(value))
+            for k, (other, there, other_accuracy) in enumerate(left)
+            if other == kind and abs(there - value) <= max(near, accuracy + other_accuracy)
         ]
         if same:
             left.pop(same[0])
         else:
             missing.append(f"{kind} at {value!r}")
     gone = f"without {', '.join(missing)}" if missing else ""
-    new = f"with {', '.join(f'{kind} at {value!r}' for kind, value in left)}" if left else ""
+    new = f"with {', '.join(f'{kind} at {value!r}' for kind, value, _ in left)}" if left else ""
     return "; ".join(text for text in (gone, new) if text)
 
 
@@ -195,7 +204,7 @@ def off(branch: cf.Branch, fine: cf.Branch) -> tuple[float, int]:
     In units of the most by which a smooth curve leaves its chord: length times angle between
     neighbouring chords (8 times what a circle does), and what a point is good to.
     """
-    width = 1.0 / max(float(np.ptp(fine.values)), 1e-12)
+    width = 1.0 / max(float(np.ptp(fine.values)), LEAST_RANGE)
     a, b = _points(branch, width), _points(fine, width)
     chord = np.diff(b, axis=0)
     length = np.linalg.norm(chord, axis=1)

@@ -11,6 +11,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -146,9 +147,10 @@ def said(notebook: dict[str, Any]) -> list[str]:
     found = []
     for cell in code_of(notebook):
         shown = [output.get("data", {"text": output.get("text", "")}) for output in cell["outputs"]]
-        kinds = [kind for data in shown for kind in sorted(data)]
+        # what a cell prints comes in as many pieces as its kernel happens to send
+        kinds = [kind for kind, _ in groupby(k for data in shown for k in sorted(data))]
         plain = ["".join(data.get("text/plain", data.get("text", ""))) for data in shown]
-        found.append("\n".join([*kinds, *plain]))
+        found.append("\n".join([*kinds, "".join(plain)]))
     return found
 
 

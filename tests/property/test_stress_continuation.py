@@ -37,11 +37,12 @@ def test_random_branches() -> None:
 
 
 def test_an_end_by_another_name_is_told() -> None:
-    ends = [("SS", 0.4918), ("CS", 0.5353)]
+    ends = [("SS", 0.4918, 1e-11), ("CS", 0.5353, 1e-11)]
     assert not continuation.difference(ends, [ends[1], ends[0]])
-    assert "SS" in continuation.difference(ends, [("RANGE", 0.4918), ("CS", 0.5353)])
-    assert "CS" in continuation.difference(ends, [("SS", 0.4918), ("CS", 0.5353 + 1e-8)])
-    assert "SN" in continuation.difference(ends, [*ends, ("SN", 0.54)])
+    assert "SS" in continuation.difference(ends, [("RANGE", 0.4918, 0.0), ends[1]])
+    assert "CS" in continuation.difference(ends, [ends[0], ("CS", 0.5353 + 1e-8, 1e-11)])
+    assert "SN" in continuation.difference(ends, [*ends, ("SN", 0.54, 1e-11)])
+    assert not continuation.difference(ends, [ends[0], ("CS", 0.5353 + 1e-8, 2e-8)])
 
 
 @pytest.mark.parametrize("off", [1e-5, 1e-3])
