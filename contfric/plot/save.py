@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -159,7 +160,8 @@ def _save_pixels(fig: Figure, file: Path) -> Path:
     pixels = np.asarray(canvas.buffer_rgba())
     if pixels[..., 3].min() == 255:  # nothing to be seen through
         pixels = np.ascontiguousarray(pixels[..., :3])
-    Image.fromarray(pixels).save(file, dpi=(fig.dpi, fig.dpi))
+    # lines and even surfaces: runs of bytes are as good as a search for repetitions, in 2/3 of the time
+    Image.fromarray(pixels).save(file, dpi=(fig.dpi, fig.dpi), compress_type=zlib.Z_RLE)
     return file
 
 
