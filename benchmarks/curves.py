@@ -12,7 +12,8 @@ import time
 import contfric as cf
 from contfric.continuation.points import Rows
 from contfric.curves.points import first_curve_point, march_rows
-from contfric.curves.problem import box_of, problem_of
+from contfric.curves.problem import problem_of
+from contfric.curves.ranges import box_of
 
 PLANE, RANGES = ("Omega", "S"), {"Omega": (0.4, 0.6), "S": (0.05, 0.39)}
 START = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
