@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib import rc_context, rcParams, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.font_manager import get_font_names
 from PIL import Image
 
 from contfric.base.interrupts import held_back
@@ -78,6 +79,18 @@ def journal(width: str) -> Iterator[None]:
             yield
     finally:
         _width.reset(before)
+
+
+@contextmanager
+def installed_fonts() -> Iterator[None]:
+    """Let text be measured and drawn in a ``with`` by those fonts of ``font.sans-serif`` that there are.
+
+    Matplotlib looks for each of them again for each size of text, and skips those that are not installed.
+    """
+    known = set(get_font_names())
+    found = [name for name in rcParams["font.sans-serif"] if name in known]
+    with rc_context({"font.sans-serif": found} if found else {}):
+        yield
 
 
 def _size(width: float, height: float) -> tuple[float, float]:
