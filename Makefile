@@ -116,12 +116,16 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/error.py
 	@$(BIN)/python benchmarks/scale.py
 	@$(BIN)/python benchmarks/scenes.py
+	@$(BIN)/python benchmarks/curves.py
+	@$(BIN)/python benchmarks/lyapunov.py
+	@$(BIN)/python benchmarks/lyapunov_models.py
 	@$(BIN)/python benchmarks/integrated.py
 	@$(BIN)/python benchmarks/states.py
 	@$(BIN)/python benchmarks/contacts.py
 	@$(BIN)/python benchmarks/six_segments.py
 	@$(BIN)/python benchmarks/first_orbit.py
 	@$(BIN)/python benchmarks/auto.py
+	@$(BIN)/python benchmarks/compile_seconds.py
 
 # An hour or more; sequences and restarts go on where they were interrupted.
 stress: $(STAMP)

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from bench_engine import branch_in_default_steps, branch_of
 from gate import LOOP, spent, turn_of_yardstick
+from origin import origin
 
 import contfric as cf
 
@@ -111,13 +112,13 @@ def measured(program: Path) -> tuple[dict[str, Series], float]:
     return found, statistics.median(yard)
 
 
-def page(found: dict[str, Series], yard: float, commit: str) -> str:
+def page(found: dict[str, Series], yard: float) -> str:
     """Return the page."""
     lines = [
         "# Against AUTO-07p",
         "",
-        f"Written by `benchmarks/auto.py` at commit {commit}; the yardstick of the machine (`make gate`) "
-        f"takes {yard * 1e3:.2f} ms. Medians of {ROUNDS} turns, processor time; AUTO's start is taken off. "
+        f"Written by `benchmarks/auto.py`: {origin()} (in the median of these turns "
+        f"{yard * 1e3:.2f} ms). Medians of {ROUNDS} turns, processor time; AUTO's start is taken off. "
         "AUTO solves the reduced form of the orbit 1a (two slides), one way from Omega = 0.5 over the fold "
         "to its end, without multipliers or admissibility; contfric follows the whole branch, both ways, "
         "with both. Steps differ: compare fine steps by the point, default steps by the branch.",
@@ -142,13 +143,9 @@ def main() -> int:
     if auto is None or shutil.which("gfortran") is None:
         print("AUTO_DIR is not set, or gfortran is not there: nothing is compared", file=sys.stderr)
         return 0
-    git = ["git", "rev-parse", "--short", "HEAD"]
-    commit = subprocess.run(
-        git, capture_output=True, text=True, cwd=PAGE.parent, check=False
-    ).stdout
     with tempfile.TemporaryDirectory() as folder:
         found, yard = measured(built(Path(folder), Path(auto)))
-    PAGE.write_text(page(found, yard, commit.strip()), encoding="utf-8")
+    PAGE.write_text(page(found, yard), encoding="utf-8")
     print(PAGE.read_text(encoding="utf-8"))
     return 0
 

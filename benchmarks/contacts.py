@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from origin import origin
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "benchmarks-states.md"
 HEADING = "## Many friction contacts"
@@ -77,7 +78,8 @@ def main() -> None:
             "{loose} | {modes} |".format(**found)
         )
     says = (
-        f"Written by `benchmarks/contacts.py`. {MASSES} masses on springs of their own (1) and between "
+        f"Written by `make bench` (`benchmarks/contacts.py`): {origin()}. "
+        f"{MASSES} masses on springs of their own (1) and between "
         f"neighbours ({COUPLING}), damping {DAMPING} K, a force cos(Omega t) on the first; friction S = "
         f"{KINETIC} of some masses against the ground. Seconds in one process on one core: load, first orbit "
         f"(simulated), and the response curve over Omega in [{RANGE[0]}, {RANGE[1]}], from near the peak "

@@ -8,8 +8,6 @@ are left out, and the page says so (``pip install '.[bench]'`` installs them).
 from __future__ import annotations
 
 import argparse
-import os
-import platform
 import time
 from pathlib import Path
 
@@ -19,6 +17,7 @@ import tasks
 from many_digits import DIGITS
 from measuring import SHORTEST, Row, measure
 from mpmath import mp
+from origin import origin
 from page import draw, duration, summary, table, verdict
 from settings import NEAR_FOLD, NODES, OMEGA, OPTIONAL, S0, S, integrators, versions
 
@@ -64,10 +63,7 @@ def machine() -> str:
     present, _ = versions()
     packages = [f"numpy {np.__version__}", f"scipy {scipy.__version__}"]
     packages += [f"{name} {number}" for name, number in present.items()]
-    return (
-        f"{platform.machine()}, {os.cpu_count()} processors, Python {platform.python_version()}, "
-        + ", ".join(packages)
-    )
+    return f"{origin()}; {', '.join(packages)}"
 
 
 def absent() -> str:

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import yaml
+from origin import origin
 
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "contfric" / "models" / "bundled"
@@ -25,6 +26,7 @@ MODELS = (
 )
 #: Keys of a file that say what a model is called, and not what it is.
 NAMES = ("name", "title", "references")
+WRITTEN = "Written by `make bench` (`benchmarks/first_orbit.py`):"
 HEAD = "| model | lines | s |\n|---|---|---|\n"
 
 
@@ -64,8 +66,11 @@ def main() -> None:
         rows += f"| {model} | {lines_of(text)} | {seconds_of(model):.1f} |\n"
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(HEAD)
-    after = rest[rest.index("\n\n") + 1 :]
-    PAGE.write_text(before + HEAD + rows + after, encoding="utf-8")
+    after = rest[rest.index("\n\n") + 2 :]
+    if after.startswith(WRITTEN):
+        after = after.partition("\n\n")[2]
+    says = f"\n{WRITTEN} {origin()}.\n\n"
+    PAGE.write_text(before + HEAD + rows + says + after, encoding="utf-8")
     print(HEAD + rows, end="")
 
 

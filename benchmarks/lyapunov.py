@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -23,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from origin import origin, renewed
 
 import contfric as cf
 from contfric.chaos.rows import Limits, follow
@@ -240,8 +239,8 @@ def report(short: bool) -> str:
         parts.append(memory())
     took = time.perf_counter() - began
     head = (
-        f"Written by `benchmarks/lyapunov.py`, which took {took:.0f} s; {platform.machine()}, "
-        f"{os.cpu_count()} processors, Python {platform.python_version()}. Medians and minima of {rounds} "
+        f"Written by `make bench` (`benchmarks/lyapunov.py`, which took {took:.0f} s): {origin()}. "
+        f"Medians and minima of {rounds} "
         "rounds in turns, warm. The plane is that of Fig. 9 of the article (S0 = 0.4, Omega from 0.1 to "
         "0.6, S from 0 to 0.4), with its initial state."
     )
@@ -261,9 +260,7 @@ def main() -> None:
     print(text)
     if not options.short:
         page = PAGE.read_text(encoding="utf-8")
-        before, _, rest = page.partition(BEGIN)
-        _, _, after = rest.partition(END)
-        PAGE.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+        PAGE.write_text(renewed(page, BEGIN, END, text), encoding="utf-8")
 
 
 if __name__ == "__main__":

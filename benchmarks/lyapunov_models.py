@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from origin import origin, renewed
 
 import contfric as cf
 from contfric.chaos.rows import Limits, follow
@@ -167,15 +167,12 @@ def main() -> None:
         cold()
         return
     head = (
-        f"Written by `benchmarks/lyapunov_models.py`; {platform.machine()}, {os.cpu_count()} processors, "
-        f"Python {platform.python_version()}. Least processor times of several rounds, warm, on a machine "
-        "with other work to do: all are too large, their ratios less so. A tolerance of 1e-12."
+        f"Written by `make bench` (`benchmarks/lyapunov_models.py`): {origin()}. Least processor times of "
+        "several rounds, warm. A tolerance of 1e-12."
     )
     text = "\n\n".join([head, *("\n".join(part) for part in (costs(), maps()))])
     page = PAGE.read_text(encoding="utf-8")
-    before, _, rest = page.partition(BEGIN)
-    _, _, after = rest.partition(END)
-    PAGE.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", encoding="utf-8")
+    PAGE.write_text(renewed(page, BEGIN, END, text), encoding="utf-8")
 
 
 if __name__ == "__main__":

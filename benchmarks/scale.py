@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import tempfile
 import time
 from pathlib import Path
@@ -10,10 +9,11 @@ from pathlib import Path
 import scale_memory
 import scale_monitors
 import scale_segments
+from origin import origin
 
 TEMPLATE = """# Cost at scale
 
-Written by `make bench` (`benchmarks/scale.py`, which took {took:.0f} s); {machine}, Python {python}.
+Written by `make bench` (`benchmarks/scale.py`, which took {took:.0f} s): {origin}.
 
 ## Segments
 
@@ -67,8 +67,7 @@ def main() -> None:
     page.write_text(
         TEMPLATE.format(
             took=time.perf_counter() - began,
-            machine=platform.machine(),
-            python=platform.python_version(),
+            origin=origin(),
             rounds=scale_segments.ROUNDS,
             points=2 * scale_segments.POINTS - 1,
             segments=scale_segments.table(segments),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from origin import origin
 from scene_tables import (
     Seen,
     breakdown_table,
@@ -126,8 +126,8 @@ def run_import() -> float:
 
 TEMPLATE = """# What a scene costs, and what it does not do
 
-Written by `make bench` (`benchmarks/scenes.py`, which took {took:.0f} s); {machine}, {processors} processors,
-Python {python}. Every number is of fresh processes; wall times are medians of {rounds} runs of
+Written by `make bench` (`benchmarks/scenes.py`, which took {took:.0f} s): {origin}.
+Every number is of fresh processes; wall times are medians of {rounds} runs of
 `contfric run` for the scenes that are claims, single runs for the others.
 
 {claims}
@@ -174,9 +174,7 @@ def main() -> None:
     page.write_text(
         TEMPLATE.format(
             took=time.perf_counter() - began,
-            machine=platform.machine(),
-            processors=os.cpu_count(),
-            python=platform.python_version(),
+            origin=origin(),
             rounds=ROUNDS,
             claims=claims(seen, cold, importing),
             scenes=scene_table(seen),

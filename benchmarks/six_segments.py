@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from origin import origin
 
 import contfric as cf
 
@@ -85,7 +86,8 @@ def main() -> None:
     lines = [
         HEADING,
         "",
-        "Written by `benchmarks/six_segments.py`. The chain above under F (cos wt + 0.6 cos 3wt) + 0.02, "
+        f"Written by `make bench` (`benchmarks/six_segments.py`): {origin()}. "
+        "The chain above under F (cos wt + 0.6 cos 3wt) + 0.02, "
         "its first mass on friction S; orbits of six segments along F, which is in no matrix. Microseconds "
         "of the processor for a point: prediction, Newton's method, all margins with their stationary "
         f"points; and with multipliers. The least of {ROUNDS} branches in turns with a yardstick (200,000 "

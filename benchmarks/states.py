@@ -8,14 +8,13 @@ matrix exponentials (scipy.linalg.expm) with events by Brent's method.
 from __future__ import annotations
 
 import contextlib
-import platform
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from origin import origin
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
@@ -230,16 +229,13 @@ def main() -> None:
     """Measure and write the page."""
     began = time.perf_counter()
     rows = [row_of(size) for size in STATES]
-    asked = ["git", "rev-parse", "--short", "HEAD"]
-    commit = subprocess.run(asked, capture_output=True, text=True, cwd=PAGE.parent, check=False)
     square = np.random.default_rng(1).normal(size=(200, 200))
     yard = least({"yard": lambda: np.linalg.eigvals(square)})["yard"]
     lines = [
         "# Number of states",
         "",
-        f"Written by `make bench` (`benchmarks/states.py`, {time.perf_counter() - began:.0f} s); commit "
-        f"{commit.stdout.strip()}, {platform.machine()}, Python {platform.python_version()}. Yardstick: "
-        f"`eigvals` of 200 rows in {yard:.0f} ms.",
+        f"Written by `make bench` (`benchmarks/states.py`, {time.perf_counter() - began:.0f} s): {origin()}; "
+        f"`eigvals` of 200 rows {yard:.0f} ms.",
         "",
         "A chain of masses on springs, forced at its free end; the first mass rubs (S = 0.2, S0 = 0.25). "
         f"{PERIODS} periods of the excitation with every stick and slip, no derivatives. Milliseconds, the "

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import subprocess
 import sys
 import tempfile
@@ -13,6 +12,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from origin import origin
 
 from contfric.study.library import study_names
 
@@ -23,8 +24,8 @@ ONCE = 60.0
 
 PAGE = """# The bundled studies
 
-Written by `make studies` (`benchmarks/studies.py`, which took {took}); {machine}, {processors} processors,
-Python {python}. Each study is run from the shell (`contfric run NAME`), with a limit of {limit:.0f} s; one
+Written by `make studies` (`benchmarks/studies.py`, which took {took}): {origin}.
+Each study is run from the shell (`contfric run NAME`), with a limit of {limit:.0f} s; one
 that does not end by itself, or ends with an error, fails the command. The times are those of a whole process
 with its kernels compiled, figures and tables written: of the clock, and of the processors. {once}
 
@@ -125,11 +126,7 @@ def main() -> int:
     if not options.names:
         page = PAGE.format(
             took=f"{(time.perf_counter() - began) / 60.0:.0f} min",
-            machine=platform.machine(),
-            processors=len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count(),
-            python=platform.python_version(),
+            origin=origin(),
             limit=options.limit,
             once=f"Studies that take longer than {ONCE:.0f} s are run once.",
             rows="\n".join(row(name, done) for name, done in runs.items()),

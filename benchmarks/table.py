@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import statistics
 import time
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from bench_engine import (
     diagram_of_fig05,
     simulation,
 )
+from origin import origin
 
 ROUNDS = 15
 #: The other pages.
@@ -23,7 +23,9 @@ FURTHER = (
     "[cost of a scene](benchmarks-scenes.md) (what it does and skips, cold and warm),",
     "[run time against error](benchmarks-error.md) (beside other packages),",
     "[AUTO-07p](benchmarks-auto.md) (a branch, paired),",
-    "[number of states](benchmarks-states.md) (a chain with a contact, beside scipy and heyoka).",
+    "[number of states](benchmarks-states.md) (a chain with a contact, beside scipy and heyoka),",
+    "[curves in two parameters](curves.md#cost), [Lyapunov maps](lyapunov.md#run-time-accuracy-memory),",
+    "[numerical integration](benchmarks-integrated.md).",
 )
 
 
@@ -61,8 +63,8 @@ def main() -> None:
     lines = [
         "# Benchmarks",
         "",
-        f"Written by `make bench`. Warm, one process, medians of {ROUNDS} rounds in turns;",
-        f"{platform.machine()}, Python {platform.python_version()}. A point of a branch",
+        f"Written by `make bench`: {origin()}.",
+        f"Warm, one process, medians of {ROUNDS} rounds in turns. A point of a branch",
         "includes Newton, tangent, multipliers, admissibility, event tests and the location of events.",
         "",
         "| what | units | median total | per unit (median) | per unit (minimum) |",

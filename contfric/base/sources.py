@@ -6,6 +6,7 @@ This module does not import numba, which takes longer than reading all sources.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -21,12 +22,21 @@ _DATA = _ROOT / "_data"
 
 def package_files() -> list[Path]:
     """Return the modules of the package."""
-    return sorted(file for file in _ROOT.rglob("*.py") if _DATA not in file.parents)
+    return [_ROOT / name for name in _package()]
 
 
 @cache
 def _package() -> dict[str, bytes]:
-    return {file.relative_to(_ROOT).as_posix(): file.read_bytes() for file in package_files()}
+    """Return the sources of the package by their names; paths as objects would take twice as long."""
+    found = {}
+    for folder, below, files in os.walk(_ROOT):
+        below[:] = [name for name in below if Path(folder, name) != _DATA]
+        for name in files:
+            if name.endswith(".py"):
+                file = os.path.join(folder, name)
+                with open(file, "rb", buffering=0) as source:
+                    found[os.path.relpath(file, _ROOT).replace(os.sep, "/")] = source.read()
+    return dict(sorted(found.items()))
 
 
 def _digest(contents: Mapping[str, bytes]) -> str:

@@ -28,7 +28,9 @@ class Part(BaseModel):
     ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key.
     """
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
+    )
 
 
 #: What pydantic calls a key that a part does not have; the second is no text.

@@ -6,6 +6,7 @@ failed, 2 the input is wrong, 130 interrupted (what was found is saved).
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,10 @@ from typing import NoReturn
 
 from contfric.cli.exits import Exit
 from contfric.errors import ContfricError
+
+#: Objects between two searches for garbage: what a run imports and draws is alive, and with Python's 700 it
+#: was looked through for a seventh of the time of a short run. So many take some 20 MB.
+_MANY = 200_000
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,6 +65,7 @@ def console() -> NoReturn:
     Everything is written and closed by then; taking Python and the compiler apart in order would
     take a quarter of a second.
     """
+    gc.set_threshold(_MANY)
     code = main()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # whoever read it has gone, or it is closed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -17,6 +16,8 @@ def certify(options: argparse.Namespace) -> int:
     from contfric.base.extras import need_flint
 
     need_flint()  # before anything is read
+    from concurrent.futures import ProcessPoolExecutor
+
     from contfric.study.certified import certify_folder
 
     folder: Path = options.folder

@@ -31,11 +31,16 @@ def say(text: str) -> None:
 def run(options: argparse.Namespace) -> int:
     """``contfric run STUDY``."""
     from contfric.cli.progress import ProgressLine
-    from contfric.study import run_study
+    from contfric.study import read_study, run_study
     from contfric.study.result import RunStatus
 
     with ProgressLine(options.quiet) as progress:
-        result = run_study(options.study, options.out, force=options.force, progress=progress)
+        study = read_study(options.study)
+        if study.drawings:
+            from contfric.plot.undocumented import load_undocumented
+
+            load_undocumented()
+        result = run_study(study, options.out, force=options.force, progress=progress)
     if options.json:
         print(json.dumps(result.info, indent=2))
     elif not options.quiet and result.files:

@@ -17,7 +17,6 @@ from numba.core import cgutils
 from numba.core.extending import intrinsic, models, register_model
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.np.arrayobj import make_array
 
 #: Motions side by side: one vector of AVX-512, two of AVX2.
 LANES = 8
@@ -149,7 +148,7 @@ bits: Any = intrinsic(prefer_literal=False)(_bits)
 
 
 def _place(context: Any, builder: Any, kind: Any, array: Any, row: Any) -> Any:
-    own = make_array(kind)(context, builder, array)
+    own = context.make_array(kind)(context, builder, array)
     _, width = cgutils.unpack_tuple(builder, own.shape, 2)
     at = builder.gep(own.data, [builder.mul(row, width)])
     return builder.bitcast(at, _VECTOR.as_pointer())

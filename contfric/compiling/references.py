@@ -18,7 +18,6 @@ from numba.core import cgutils
 from numba.core.extending import infer_getattr, intrinsic, models, register_model
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
-from numba.np.arrayobj import make_array
 
 
 class Reference(types.Type):  # type: ignore[misc]
@@ -105,7 +104,7 @@ words_of: Any = intrinsic(prefer_literal=False)(_words_of)
 
 def _address(context: Any, builder: Any, kinds: Any, arguments: Any, target: Any) -> Any:
     """Return where the named tuple number k lies in memory."""
-    memory = make_array(kinds[0])(context, builder, arguments[0])
+    memory = context.make_array(kinds[0])(context, builder, arguments[0])
     words = context.get_constant(types.int64, _words(context, target))
     at = builder.gep(memory.data, [builder.mul(arguments[1], words)])
     return builder.bitcast(at, context.get_value_type(target).as_pointer())

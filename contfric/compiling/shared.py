@@ -8,7 +8,6 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.extending import intrinsic
-from numba.np.arrayobj import make_array, populate_array
 
 _FREE, _TAKEN = ir.Constant(ir.IntType(64), 0), ir.Constant(ir.IntType(64), 1)
 
@@ -40,11 +39,14 @@ def _numbers_at(typing: Any, place: Any, size: Any) -> Any:
     kind = types.Array(types.float64, 1, "C")
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        array, word = make_array(kind)(context, builder), context.get_constant(types.intp, 8)
+        array = context.make_array(kind)(context, builder)
         data, count = arguments
+        word = context.get_constant(types.intp, 8)
         shape = cgutils.pack_array(builder, [count])
         strides = cgutils.pack_array(builder, [word])
-        populate_array(array, data, shape, strides, word, None)
+        context.populate_array(
+            array, data=data, shape=shape, strides=strides, itemsize=word, meminfo=None
+        )
         return array._getvalue()
 
     return kind(place, types.int64), code

@@ -8,14 +8,13 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.extending import intrinsic
-from numba.np.arrayobj import make_array
 
 _EIGHT = ir.VectorType(ir.DoubleType(), 8)
 
 
 def _place(context: Any, builder: Any, kind: Any, value: Any, row: Any, column: Any) -> Any:
     """Return the address of eight numbers of a row of a matrix."""
-    array = make_array(kind)(context, builder, value)
+    array = context.make_array(kind)(context, builder, value)
     _, width = cgutils.unpack_tuple(builder, array.shape, 2)
     at = builder.add(builder.mul(row, width), column)
     return builder.bitcast(builder.gep(array.data, [at]), _EIGHT.as_pointer())
@@ -50,7 +49,7 @@ subtract_eight: Any = intrinsic(prefer_literal=False)(_subtract_eight)
 
 def _address(context: Any, builder: Any, kind: Any, value: Any, row: Any) -> tuple[Any, Any, Any]:
     """Return the address of a row of a matrix, and the shape of the matrix."""
-    array = make_array(kind)(context, builder, value)
+    array = context.make_array(kind)(context, builder, value)
     height, width = cgutils.unpack_tuple(builder, array.shape, 2)
     return builder.gep(array.data, [builder.mul(row, width)]), height, width
 

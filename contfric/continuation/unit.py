@@ -91,7 +91,7 @@ class Unit:
 
     def starts(self, count: int) -> FloatArray:
         """Return the joints at which that many units begin, one after the other, shape (count, 1 + n)."""
-        starts = np.tile(self.cut, (count, 1))
+        starts = np.repeat(self.cut[None], count, axis=0)
         starts[:, 0] += np.arange(count) * self.duration
         if self.half:
             assert self.model.symmetry is not None
@@ -197,11 +197,16 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     else:
         gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * period) % period - 0.5 * period)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    fits = (gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION)
+    modes = [whole(mode) for mode, _ in orbit.itinerary]
+    wanted = [whole(unit.mode)]
+    if unit.half:
+        wanted.append(whole(mirror_mode(unit.model)[unit.mode]))
     cuts = []
-    for j, fits in enumerate((gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION)):
-        mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
-        found = [i for i in np.flatnonzero(fits) if whole(orbit.itinerary[i][0]) == whole(mode)]
-        if not found:
+    for j, row in enumerate(fits.tolist()):
+        mode = wanted[j % len(wanted)]
+        found = next((i for i, fit in enumerate(row) if fit and modes[i] == mode), None)
+        if found is None:
             return None
-        cuts.append(int(found[0]))
+        cuts.append(found)
     return cuts

@@ -74,20 +74,30 @@ def _crossing(rate: Callable[[float], float], a: float, b: float) -> float:
 
 def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], float]:
     """Return the acceleration with which a rest would be left, as a function of time."""
+    rest, flow = orbit.itinerary[i][0], orbit.flow
+    sign, observable = _left(orbit, rest, departs)
+    begin, start = float(orbit.begins[i, 0]), orbit.begins[i, 1:]
 
     def rate(time: float) -> float:
-        return leaving_rate(orbit, orbit.itinerary[i][0], departs, joint_within(orbit, i, time))
+        return sign * flow.rate(
+            departs, observable, time, flow.state(rest, begin, start, time - begin)
+        )
 
     return rate
 
 
-def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
-    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
+def _left(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
+    """Return the side to which a rest is left into a departing mode, and the observable that tells."""
     model = orbit.model
     rest = model.domains_of(mode)[0]
     leaves = next(name for name, sign in rest.signs.items() if sign == 0)
     sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
-    observable = model.surface_by_name[leaves].observable
+    return sign, model.surface_by_name[leaves].observable
+
+
+def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
+    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
+    sign, observable = _left(orbit, mode, departs)
     return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
 
 

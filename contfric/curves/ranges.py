@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
 
 import numpy as np
 
 from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +26,12 @@ class Ranges:
     low: FloatArray
     high: FloatArray
 
-    @property
+    @cached_property
     def widths(self) -> FloatArray:
         """Widths of the ranges, in which arclength is measured."""
         return self.high - self.low
 
-    @property
+    @cached_property
     def edges(self) -> FloatArray:
         """The sides: rows (a, c) with ``a . p + c >= 0`` inside, in widths, shape (2 q, q + 1)."""
         rows = []

@@ -26,7 +26,7 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -332,11 +332,17 @@ class Model(Shown, TransitionMaps):
 def _told_apart(model: Model) -> tuple[Any, ...]:
     """Return what tells a model from others: its definition, or its name and the file that makes its flow."""
     code = getattr(model.flow_factory, "__code__", None)
-    source = b""
-    if code is not None and not model.definition:
-        with suppress(OSError):
-            source = Path(code.co_filename).read_bytes()
-    return model.name, model.definition, model.parameter_names, sha256(source).hexdigest()
+    source = "" if code is None or model.definition else code.co_filename
+    return model.name, model.definition, model.parameter_names, _digest_of(source)
+
+
+@cache
+def _digest_of(source: str) -> str:
+    """Return the digest of a file of the program, which stays what it was loaded from; of none without it."""
+    content = b""
+    with suppress(OSError):
+        content = Path(source).read_bytes() if source else content
+    return sha256(content).hexdigest()
 
 
 given(Model, _told_apart)

@@ -45,9 +45,12 @@ SLOW = 2e-3
 _NUMERICS = ("numpy", "numba", "llvmlite", "scipy")
 
 
-def digest_of(content: bytes) -> bytes:
-    """Return the digest of some bytes."""
-    return hashlib.blake2b(content, digest_size=_SIZE).digest()
+def digest_of(*content: bytes) -> bytes:
+    """Return the digest of some bytes, one after the other."""
+    found = hashlib.blake2b(digest_size=_SIZE)
+    for piece in content:
+        found.update(piece)
+    return found.digest()
 
 
 @cache
@@ -119,17 +122,18 @@ class Journal:
         """Append a result; where the disk is full it is not kept, and the computation goes on."""
         if self._file < 0:
             return
-        content = key + result
-        record = len(content).to_bytes(8, "little") + digest_of(content) + content
+        size = len(key) + len(result)
+        head = size.to_bytes(8, "little") + digest_of(key, result) + key
         try:
             os.lseek(self._file, self._end, os.SEEK_SET)
-            _write(self._file, record)
+            _write(self._file, head)
+            _write(self._file, result)
         except OSError:
             with suppress(OSError):
                 os.ftruncate(self._file, self._end)
             return
-        self._places[key] = self._end + _HEAD, len(content)
-        self._end += len(record)
+        self._places[key] = self._end + _HEAD, size
+        self._end += _HEAD + size
 
     def _read(self, first_line: bytes) -> int:
         """Find the records; return where the next one is written."""

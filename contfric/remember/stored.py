@@ -21,8 +21,8 @@ import numpy as np
 _PACKAGE = "contfric"
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.
 _MANY = 8
-#: What arrays of one shape, and of one order in memory, have in common.
-_LIKE = attrgetter("dtype", "shape", "strides")
+#: What arrays of one column have in common.
+_TYPE, _SHAPE = attrgetter("dtype"), attrgetter("shape")
 
 
 class UnstorableError(Exception):
@@ -144,11 +144,15 @@ class Writer:
             column = list(map(attrgetter(field.name), values))
             first, types = column[0], set(map(type, column))
             if types == {np.ndarray}:
-                if list(map(_LIKE, column)).count(_LIKE(first)) < len(column):
+                for part in (_TYPE, _SHAPE):  # one after the other: no tuple for each array
+                    if list(map(part, column)).count(part(first)) < len(column):
+                        return None
+                if first.dtype.hasobject:
                     return None
-                if first.dtype.hasobject or not first.flags.c_contiguous:
+                try:
+                    plain, shape, content = None, first.shape, b"".join(column)
+                except TypeError:  # of another order in memory
                     return None
-                plain, shape, content = None, first.shape, b"".join(column)
             elif types in ({float}, {bool}):
                 plain, shape, first = types.pop().__name__, (), np.array(column)
                 content = first.tobytes()

@@ -13,53 +13,42 @@ import hashlib
 import json
 import zipfile
 from pathlib import Path
-from typing import Any, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.atlas.diagram import Diagram
-from contfric.atlas.plane import Plane
 from contfric.base.files import replacing
-from contfric.chaos.map import LyapunovMap
-from contfric.continuation.branch import Branch
-from contfric.curves.curve import Curve
-from contfric.curves.quantity_curve import QuantityCurve
-from contfric.ensembles.ensemble import Ensemble
-from contfric.equilibria.branch import EquilibriumBranch
-from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.errors import ModelError, ParameterError, ResultFileError, path_of
-from contfric.fitting.result import Fit
 from contfric.models import load_model
 from contfric.models.definition import Model
-from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import Trajectory
 from contfric.remember.stored import UnstorableError
-from contfric.response.basins import Basins
-from contfric.response.returns import ReleaseMap, Returns
-from contfric.response.stable_set import StableSet
-from contfric.response.sweep import Sweep
 from contfric.results.codec import Arrays, ResultReader, ResultWriter
 
+if TYPE_CHECKING:
+    from contfric.atlas.diagram import Diagram
+    from contfric.atlas.plane import Plane
+    from contfric.chaos.map import LyapunovMap
+    from contfric.continuation.branch import Branch
+    from contfric.curves.curve import Curve
+    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.ensembles.ensemble import Ensemble
+    from contfric.equilibria.branch import EquilibriumBranch
+    from contfric.equilibria.explore import EquilibriumDiagram
+    from contfric.fitting.result import Fit
+    from contfric.orbit.orbit import Orbit
+    from contfric.orbit.simulation import Trajectory
+    from contfric.response.basins import Basins
+    from contfric.response.returns import ReleaseMap, Returns
+    from contfric.response.stable_set import StableSet
+    from contfric.response.sweep import Sweep
+
+#: By name: to write one kind of result, those of the others are not loaded.
 Saveable: TypeAlias = (
-    Orbit
-    | Branch
-    | Diagram
-    | Curve
-    | QuantityCurve
-    | Plane
-    | Trajectory
-    | LyapunovMap
-    | Sweep
-    | Returns
-    | ReleaseMap
-    | Basins
-    | StableSet
-    | EquilibriumBranch
-    | EquilibriumDiagram
-    | Ensemble
-    | Fit
+    "Orbit | Branch | Diagram | Curve | QuantityCurve | Plane | Trajectory | LyapunovMap | Sweep | Returns "
+    "| ReleaseMap | Basins | StableSet | EquilibriumBranch | EquilibriumDiagram | Ensemble | Fit"
 )
+_KINDS = tuple(str(Saveable).split(" | "))
 
 #: Version of the format; it grows when this contfric cannot read what an earlier one has written.
 FORMAT = 3
@@ -92,10 +81,9 @@ def save(x: Saveable, path: str | Path) -> None:
     >>> bool((cf.load(file).joints == orbit.joints).all())
     True
     """
-    if not isinstance(x, Saveable):
+    if not _is_result(x):
         raise ResultFileError(
-            f"only results can be saved ({', '.join(kind.__name__ for kind in get_args(Saveable))}), "
-            f"got {type(x).__name__}"
+            f"only results can be saved ({', '.join(_KINDS)}), got {type(x).__name__}"
         )
     place = path_of("the file of a result", path)
     writer = ResultWriter(x.model)
@@ -115,6 +103,11 @@ def save(x: Saveable, path: str | Path) -> None:
     arrays[_DIGESTS] = _as_array(_digests(arrays))
     with replacing(place) as temporary:
         _write(temporary, arrays)
+
+
+def _is_result(x: object) -> bool:
+    ours = (kind for kind in type(x).__mro__ if kind.__module__.startswith("contfric."))
+    return any(kind.__name__ in _KINDS for kind in ours)
 
 
 def _write(path: Path, arrays: Arrays) -> None:
@@ -212,9 +205,9 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
         found = ResultReader(bytes(arrays.pop(_CONTENT)), owner, arrays).value()
     except (UnstorableError, LookupError) as error:
         raise ResultFileError(_damaged(path, str(error))) from None
-    if not isinstance(found, Saveable):
+    if not _is_result(found):
         raise ResultFileError(_damaged(path, "it holds no result"))
-    return found
+    return cast("Saveable", found)
 
 
 def _read(path: Path) -> Arrays:

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End
-from contfric.curves.curve import CurvePart
 from contfric.curves.special import SpecialPoint
 from contfric.equilibria.regions import Region, regions_of
 from contfric.errors import ResultFileError
@@ -33,7 +32,7 @@ _LARGE = 4096
 #: parts share an array depends on how they were found, and the same result is the same file.
 _SHARED = (Model, System, Orbit, Bifurcation, End, SpecialPoint, Region)
 #: What a curve was computed from is not kept.
-_LEFT_OUT = {(CurvePart, "problem")}
+_LEFT_OUT = {("CurvePart", "problem")}
 
 
 class ResultWriter(Writer):
@@ -64,7 +63,7 @@ class ResultWriter(Writer):
 
     def _field(self, value: Any, name: str) -> Any:
         self._field_name = name
-        return None if (type(value), name) in _LEFT_OUT else super()._field(value, name)
+        return None if (type(value).__name__, name) in _LEFT_OUT else super()._field(value, name)
 
     def _array(self, array: NDArray[Any]) -> list[Any]:
         if array.nbytes < _LARGE:

@@ -123,9 +123,10 @@ def draw(path: Path, drawing: Drawing, found: Found, title: str) -> None:
     Matplotlib is loaded here, and only when a figure is drawn.
     """
     from contfric.plot.labels import laid_out
-    from contfric.plot.save import journal, new_figure, save_figure
+    from contfric.plot.save import installed_fonts, journal, new_figure, save_figure
 
-    with nullcontext() if drawing.journal is None else journal(drawing.journal.value):
+    wide = nullcontext() if drawing.journal is None else journal(drawing.journal.value)
+    with wide, installed_fonts():
         look = FIGURES[drawing.kind][0]
         figure = new_figure(look.width, look.height + look.row_height * len(drawing.rows))
         drawing.task.draw(figure, drawing, found, "" if drawing.journal else title)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import contfric as cf
 from contfric.cli import main
 from contfric.cli.exits import Exit
 
@@ -311,6 +312,28 @@ def test_explain_imports_nothing_heavy() -> None:
     code, out, err = finish(command("explain", "fig05", before=before))
     assert (code, err.split()) == (0, [])
     assert "1. orbit: simulate until" in out
+
+
+def test_a_run_loads_what_its_study_asks_for(study, tmp_path: Path) -> None:
+    before = (
+        "import atexit\n"
+        "other = ('matplotlib', 'concurrent.futures.process', 'contfric.chaos.map',\n"
+        "  'contfric.ensembles.ensemble', 'contfric.equilibria.explore', 'contfric.fitting.result',\n"
+        "  'contfric.response.sweep', 'contfric.curves.curve')\n"
+        "atexit.register(lambda: print(*[m for m in other if m in sys.modules], file=sys.stderr))"
+    )
+    options = ("run", study(HEAD + EXPLORE), "--out", tmp_path / "out", "--quiet")
+    code, _, err = finish(command(*options, before=before))
+    assert (code, err.split()) == (0, [])
+
+
+def test_figures_of_a_run_are_those_of_the_library(tmp_path: Path) -> None:
+    code, _, err = finish(command("run", "fig05", "--out", str(tmp_path / "shell"), "--quiet"))
+    assert code == 0, err
+    cf.run_study("fig05", tmp_path / "library")
+    for name in ("diagram.png", "orbit.png"):
+        drawn = [(tmp_path / which / name).read_bytes() for which in ("shell", "library")]
+        assert drawn[0] == drawn[1]
 
 
 def test_help_is_light() -> None:
