@@ -135,14 +135,21 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit.system, test) for e in events for test in e.tests):
                 below = above = None
+            if _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
+                below = above = None  # beyond it orbits have another offset, each of a continuum
             yield Balance(number, b.label, value, times * period, below, above)
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
     """Return the orbit at an event behind which the mass stays at rest for ever; None at others."""
+    return _ended(diagram, node, EndReason.REST)
+
+
+def _ended(diagram: Diagram, node: Node, reason: EndReason) -> Orbit | None:
+    """Return the orbit at an event at which a branch ends for a reason; None where none does."""
     for i in node.branches:
         for end in diagram.branches[i].ends:
-            if end.reason is EndReason.REST and end.bifurcation is not None:
+            if end.reason is reason and end.bifurcation is not None:
                 here, b = end.bifurcation.params[diagram.parameter], node.bifurcation
                 if here == b.params[diagram.parameter]:
                     return end.bifurcation.orbit
