@@ -15,6 +15,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
+from contfric.signature.holds import left_surface
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
 #: would be left with depends on them monotonically, one would be enough, as in every model of a load.
@@ -84,8 +85,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
 def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
     """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
     model = orbit.model
-    rest = model.domains_of(mode)[0]
-    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
+    leaves = left_surface(model, mode, departs)
     sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
     observable = model.surface_by_name[leaves].observable
     return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
