@@ -118,12 +118,14 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         nodes, slack = _joined(diagram, number)
         # a doubling that is joined has a shorter unit than what ends next to it
         units = (diagram.nodes[joined].bifurcation.orbit.as_whole() for joined in nodes)
-        period = math.gcd(*(unit_of(whole).periods for whole in units))
         families = [
             found
             for joined in nodes
             for found in _families(diagram, diagram.nodes[joined], value, slack)
         ]
+        # a graze is known to the root of rounding, and may not show that its motion repeats itself
+        lengths = [*(unit_of(whole).periods for whole in units), *(o.periods for _, o in families)]
+        period = math.gcd(*lengths)
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
         for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
