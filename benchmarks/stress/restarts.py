@@ -10,7 +10,9 @@ Points are asked for admissibility, and sums of indices are tested.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from chunks import Chunked
@@ -41,11 +43,13 @@ VARIED = ("Omega", "S", "S0", "h", "zeta")
 
 @dataclass(frozen=True)
 class Scene:
-    """Parameters, what varies, and its range."""
+    """Parameters, what varies, and its range; the model, and where it is simulated from."""
 
     params: dict[str, float]
     vary: str
     range: tuple[float, float]
+    model: str = "coulomb"
+    start: dict[str, Any] = field(default_factory=dict)
 
 
 def scene(seed: int, index: int) -> Scene:
@@ -67,6 +71,8 @@ def scene(seed: int, index: int) -> Scene:
 
 def excuse(found: Scene) -> str:
     """Return the degenerate class of a scene; nothing if it has none. Fixed before any scene is run."""
+    if found.model != "coulomb":
+        return ""
     low, high = found.range
     p = found.params
     if found.vary in ("S", "S0"):
@@ -83,32 +89,45 @@ def excuse(found: Scene) -> str:
     return ""
 
 
-def chunk(seed: int, first: int, last: int) -> Tally:
+def chunk(
+    seed: int,
+    first: int,
+    last: int,
+    draw: Callable[[int, int], Scene] = scene,
+    limit: float = LIMIT,
+    most_periods: int | None = None,
+) -> Tally:
     """Explore the random scenes of a range of indices, and restart them."""
     tally = Tally()
     for index in range(first, last):
         tally.index = index
         start = time.process_time()
         try:
-            with time_limit(LIMIT):
-                one_scene(tally, scene(seed, index))
+            with time_limit(limit):
+                one_scene(tally, draw(seed, index), max_periods=most_periods)
         except TimeoutError:
             tally.met("cut: longer than the limit of a scene")
         except (
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
-            tally.check("no exception", False, f"{scene(seed, index)}: {error!r}")
+            tally.check("no exception", False, f"{draw(seed, index)}: {error!r}")
         tally.largest("processor seconds of one scene", time.process_time() - start)
     return tally
 
 
 def one_scene(
-    tally: Tally, found: Scene, most: int = RESTARTS, branches: int = MOST_BRANCHES
+    tally: Tally,
+    found: Scene,
+    most: int = RESTARTS,
+    branches: int = MOST_BRANCHES,
+    max_periods: int | None = None,
 ) -> None:
     """Explore one scene, ask its points, and verify it; one with more branches is cut."""
     try:
-        orbit = cf.find_orbit("coulomb", found.params, longest=1000)
-        diagram = cf.explore(orbit, found.vary, found.range, max_branches=branches)
+        orbit = cf.find_orbit(found.model, found.params, longest=1000, **found.start)
+        diagram = cf.explore(
+            orbit, found.vary, found.range, max_branches=branches, max_periods=max_periods
+        )
     except cf.ContfricError as error:
         tally.met(f"no start: {type(error).__name__}")
         return

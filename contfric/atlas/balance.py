@@ -118,12 +118,14 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         nodes, slack = _joined(diagram, number)
         # a doubling that is joined has a shorter unit than what ends next to it
         units = (diagram.nodes[joined].bifurcation.orbit.as_whole() for joined in nodes)
-        period = math.gcd(*(unit_of(whole).periods for whole in units))
         families = [
             found
             for joined in nodes
             for found in _families(diagram, diagram.nodes[joined], value, slack)
         ]
+        # a graze is known to the root of rounding, and may not show that its motion repeats itself
+        lengths = [*(unit_of(whole).periods for whole in units), *(o.periods for _, o in families)]
+        period = math.gcd(*lengths)
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
         for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
@@ -135,14 +137,21 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit.system, test) for e in events for test in e.tests):
                 below = above = None
+            if _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
+                below = above = None  # beyond it orbits have another offset, each of a continuum
             yield Balance(number, b.label, value, times * period, below, above)
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
     """Return the orbit at an event behind which the mass stays at rest for ever; None at others."""
+    return _ended(diagram, node, EndReason.REST)
+
+
+def _ended(diagram: Diagram, node: Node, reason: EndReason) -> Orbit | None:
+    """Return the orbit at an event at which a branch ends for a reason; None where none does."""
     for i in node.branches:
         for end in diagram.branches[i].ends:
-            if end.reason is EndReason.REST and end.bifurcation is not None:
+            if end.reason is reason and end.bifurcation is not None:
                 here, b = end.bifurcation.params[diagram.parameter], node.bifurcation
                 if here == b.params[diagram.parameter]:
                     return end.bifurcation.orbit

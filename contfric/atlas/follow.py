@@ -161,7 +161,9 @@ def _follow_flow(state: Exploration, event: Event) -> None:
                 state.merge(event, end)
     for itinerary in (w for w in refused if w not in done):
         state.judge(event, reason, Verdict.REFUSED, why=refused[itinerary])
-    if creeps and creeps == refused.keys() and not done and len(event.branches) == 1:
+    # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere
+    alone = creeps == refused.keys() or len(orbit.system.layout.conserved) > 0
+    if creeps and alone and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
 
 

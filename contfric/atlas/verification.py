@@ -25,14 +25,14 @@ from contfric.atlas.degenerate import degenerate_events, unresolved
 from contfric.atlas.matching import identity, on_branch, same_place
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, EndReason
+from contfric.continuation.events import ACCURACY, Bifurcation, EndReason
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 
 if TYPE_CHECKING:
-    from contfric.atlas.diagram import Diagram
+    from contfric.atlas.diagram import Diagram, Node
 
 #: Step of a restart, in steps of the diagram: no ratio of small whole numbers, so that no point is met again.
 STEP = 0.31
@@ -229,7 +229,9 @@ def differences(one: Diagram, other: Diagram) -> Iterator[str]:
     """Yield what a diagram has and another one has not, in words: events, then branches up to symmetry."""
     width = one.range[1] - one.range[0]
     for event in one.bifurcations:
-        if not any(_same_bifurcation(event, b, one.parameter, width) for b in other.bifurcations):
+        if not any(
+            _same_bifurcation(event, b, one.parameter, width) for b in other.bifurcations
+        ) and not any(_is_at(event, node, other) for node in other.events):
             yield f"{event.label} at {one.parameter} = {event.params[one.parameter]:.12g}"
     for branch in one.branches:
         if not branch.mirrored and not any(
@@ -242,6 +244,24 @@ def differences(one: Diagram, other: Diagram) -> Iterator[str]:
 
 def _same_bifurcation(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     return a.kind is b.kind and same_place(a, b, parameter, width)
+
+
+def _is_at(event: Bifurcation, node: Node, diagram: Diagram) -> bool:
+    """Tell whether an event is that of a node as another of its branches has it.
+
+    Where a reset is met together with a surface, the motions of the branches that meet there differ by what
+    it maps: the node has that of the branch that came first.
+    """
+    parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
+    value = node.bifurcation.params[parameter]
+    if node.bifurcation.kind is not event.kind:
+        return False
+    return any(
+        abs(b.params[parameter] - value) <= ACCURACY * width
+        and same_place(event, b, parameter, width)
+        for i in node.branches
+        for b in diagram.branches[i].bifurcations
+    )
 
 
 def _covers(known: Branch, branch: Branch) -> bool:

@@ -48,6 +48,8 @@ _MISSED = 10.0
 #: changes by over the step, where it changes fast.
 _CRITICAL = frozenset({Kind.SN, Kind.BP, Kind.PD})
 _ON_CIRCLE, _OF_CHANGE = 1e-6, 1e-4
+#: Rounding of the largest multiplier that hides all others: they are those of one product.
+_EPS, _HIDDEN = float(np.finfo(float).eps), 0.1
 #: An event whose equations are singular together is located to the root of rounding at best.
 _SINGULAR = 1e-6
 
@@ -266,21 +268,32 @@ def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings
     """Return what a change of sign is if no multiplier is on the unit circle there; empty for an event.
 
     The multiplier is that of the orbit's own joints. It may miss the circle by rounding, or by a small share
-    of what it changes by over the step.
+    of what it changes by over the step. Next to a graze one multiplier is so large that its rounding is as
+    large as all others.
     """
     kind, orbit = bifurcation.kind, bifurcation.orbit
     if not settings.stability or kind not in _CRITICAL or not bifurcation.located:
         return ""
     off = abs(off_circle(kind, orbit))
     largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))
+    if kind is not Kind.SN and _EPS * largest > _HIDDEN:  # a fold is seen by its parameter
+        return (
+            f"{_none_of(bifurcation)} beside multipliers of {largest:.2g} rounding decides its test"
+        )
     changes = 0.0
     if before.mu.size and np.all(np.isfinite([before.mu, after.mu])):
         s = critical(kind, orbit)
         changes = min(float(np.min(np.abs(point.mu - s))) for point in (before, after))
     if off <= max(_ON_CIRCLE * (1.0 + largest), _OF_CHANGE * changes):
         return ""
+    return (
+        f"{_none_of(bifurcation)} its test changes sign, the multiplier is {off:.2g} off the circle"
+    )
+
+
+def _none_of(bifurcation: Bifurcation) -> str:
     where = ", ".join(f"{k} = {v:.10g}" for k, v in bifurcation.params.items())
-    return f"no {kind.value} at {where}: its test changes sign, the multiplier is {off:.2g} off the circle"
+    return f"no {bifurcation.kind.value} at {where}:"
 
 
 def critical(kind: Kind, orbit: Orbit) -> float:

@@ -18,9 +18,6 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import SHORT
 
-#: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
-#: to about 1e-4 only. The branch that leaves starts at twice the distance.
-_CROWD = 5e-4
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
 #: Flights this high (relative to 1 + the states) between contacts are about to vanish: their impacts have
@@ -148,7 +145,7 @@ def ends_at(
         return False
     if ends in (EndReason.BP, EndReason.PD):
         active = orbit.model.index_of(settings.parameter)
-        side.drop_crowd(point.arc - _CROWD)
+        side.drop_crowd(point.arc)
         side.put_tip(at_vertex(point, bifurcation.orbit, active))
     else:
         side.put_tip(point)

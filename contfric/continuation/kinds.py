@@ -32,7 +32,6 @@ import numpy as np
 
 from contfric.continuation.events import Kind
 from contfric.continuation.touching import (
-    begins_to_slide,
     chosen_at,
     is_corner,
     rate_along,
@@ -43,6 +42,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
+from contfric.signature.holds import ends_rest
 
 #: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
 #: times a rate of the load, and Newton may fail before they are below 1e-5.
@@ -74,7 +74,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     joint = test.margin is Margin.JOINT
     touched = touched_at_joint(system, test, orbit) if joint else test.surface
     if touched is not None:
-        if model.mode_by_name[mode].sliding and not begins_to_slide(model, mode, touched):
+        if ends_rest(model, mode, touched):
             return Kind.AS
         return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
     return Kind.CS if _leaves(system, test, orbit) else Kind.SS

@@ -51,7 +51,14 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.starts import signs_at
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
-from contfric.signature.holds import TOUCH, hold_at, is_hold, release_mode
+from contfric.signature.holds import (
+    TOUCH,
+    ends_rest,
+    hold_at,
+    is_hold,
+    left_surface,
+    release_mode,
+)
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
@@ -143,7 +150,7 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         raise NoJump(f"{place.surface} is touched at a section: nothing can be held there")
     if place.margin is Margin.LASTING:
         return _pinned_at_stop(orbit, place)
-    rests, ends = orbit.model.mode_by_name[mode].sliding, place.margin is Margin.EXIT
+    rests, ends = ends_rest(orbit.model, mode, place.surface), place.margin is Margin.EXIT
     if rests:
         return _released_tangentially(orbit, place) if ends else _limit_touched(orbit, place)
     return _stops_tangentially(orbit, place) if ends else _rest_touched(orbit, place)
@@ -155,7 +162,7 @@ def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
     j = (i + 1) % len(itinerary)
     rest = _rest_mode(orbit, i, itinerary[i][1])
     _check_held(orbit, rest, release_mode(model, rest, place.surface), orbit.ends[i])
-    if model.mode_by_name[itinerary[j][0]].sliding:
+    if model.lies_on(itinerary[j][0], itinerary[i][1]):
         return _stick_becomes_hold(orbit, j, hold_at(place.surface), place.surface)
     edit = insert(i, (rest, hold_at(place.surface)))
     reason = f"hold at stop {i + 1}, on {place.surface}, instead of the reversal"
@@ -167,7 +174,7 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     itinerary, i = orbit.itinerary, place.segment
     j = (i + 1) % len(itinerary)
     _rest_mode(orbit, i, itinerary[i][1])
-    if not orbit.model.mode_by_name[itinerary[j][0]].sliding:
+    if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
     _check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
@@ -200,7 +207,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
-        left = (departs, _leaves(orbit, mode))
+        left = (departs, left_surface(model, mode, departs))
         edit = split(i, place.surface, (mode, TOUCH), left, (mode, exit_))
         away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
         return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
@@ -232,7 +239,7 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
     reason = f"hold instead of stick {j + 1}"
     still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), departs)
     if still is not None:
-        left = (departs, _leaves(orbit, mode))
+        left = (departs, left_surface(model, mode, departs))
         edit = split(j, hold, left, (mode, exit_))
         away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
         return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
@@ -263,7 +270,7 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     """Return what follows where a hold comes to an end of its freedom."""
     h, itinerary = place.segment, orbit.itinerary
     before, behind = h - 1, (h + 1) % len(itinerary)
-    after_rest = orbit.model.mode_by_name[itinerary[before][0]].sliding
+    after_rest = ends_rest(orbit.model, *itinerary[before])
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
     if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length:
@@ -285,7 +292,8 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     ):  # a second hold, and the slide between them
         return _never_left(orbit, h, after_rest)
     touch = touch_of(orbit, h, None)
-    left = (itinerary[behind][0], _leaves(orbit, itinerary[h][0]))
+    departs = itinerary[behind][0]
+    left = (departs, left_surface(orbit.model, itinerary[h][0], departs))
     reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
     edit = insert(h, left, (itinerary[h][0], TOUCH))
     away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
@@ -303,7 +311,7 @@ def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
     """Return the outcome where the slide behind a hold has vanished: the rest behind it takes over."""
     itinerary, count = orbit.itinerary, len(orbit.itinerary)
     slide, rest = (h + 1) % count, (h + 2) % count
-    if not orbit.model.mode_by_name[itinerary[rest][0]].sliding:
+    if not orbit.model.lies_on(itinerary[rest][0], itinerary[slide][1]):
         raise NotationError(f"the slide behind hold {h + 1} vanishes, and no rest follows it")
     reason = f"the slide behind hold {h + 1} vanishes: it is held"
     if rest in (h, (h - 1) % count):
@@ -382,14 +390,8 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
     for domain in model.domains_of(model.whole_mode(orbit.itinerary[i][0])):
         for through, target in model.exits_of(domain.name):
             rest = model.domain_by_name[target].mode
-            if through == surface and model.mode_by_name[rest].sliding:
+            if through == surface and model.lies_on(rest, surface):
                 return rest
     raise NoJump(
         f"mode '{orbit.itinerary[i][0]}' of model '{model.name}' never comes to rest on {surface}"
     )
-
-
-def _leaves(orbit: Orbit, mode: str) -> str:
-    """Return the surface that a mode of rest lies on."""
-    rest = orbit.model.domains_of(mode)[0]
-    return next(name for name, sign in rest.signs.items() if sign == 0)

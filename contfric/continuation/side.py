@@ -37,6 +37,9 @@ _GIVES_WAY = 4.0 * SMALLEST_STEP
 _GROWTH = 8
 #: Rows that are moved at once: few enough to need no memory to speak of.
 _BLOCK = 1 << 14
+#: Points this near to a vertex (arclength) are left out: the system is singular there, and they are good
+#: to about 1e-4 only. The branch that leaves starts at twice the distance.
+_CROWD = 5e-4
 
 #: What a branch keeps of its points, and with multipliers.
 _KEPT = ("joints", "values", "arc", "labels")
@@ -187,8 +190,8 @@ class Side:
         self.end = end
 
     def drop_crowd(self, arc: float) -> None:
-        """Take away the points behind a place, but for the last one."""
-        while self.last > 1 and self.rows.arc[self.last - 1] > arc:
+        """Take away the points just before a vertex, but for the last one."""
+        while self.last > 1 and self.rows.arc[self.last - 1] > arc - _CROWD:
             self.drop_tip()
 
     def relabel_first(self, labels: IntArray) -> None:

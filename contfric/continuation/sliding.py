@@ -13,7 +13,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.touching import is_rate_of, rate_along
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test, inside_sign
-from contfric.signature.holds import is_hold
+from contfric.signature.holds import ends_rest, is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
@@ -129,8 +129,10 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    rests = here.model.mode_by_name[here.itinerary[i][0]].sliding
-    if rests or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period:
+    if (
+        ends_rest(here.model, *here.itinerary[i])
+        or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period
+    ):
         return first
     before = (i - 1) % here.system.segments
     at_stop = [

@@ -31,6 +31,8 @@ SAME_PLACE = 1e-7
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 SAME_TANGENCY = 2e-6
+#: A segment this short has no length: an event at which it comes in is located to the root of rounding.
+_NO_LENGTH = 1e-6
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -143,7 +145,10 @@ def _is_pole(value: float, a: float, b: float) -> bool:
 
 
 def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
-    """Return the events T: changes of the surfaces that a segment crosses."""
+    """Return the events T: changes of the surfaces that a segment crosses.
+
+    At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.
+    """
     found: list[Located] = []
     active = orbit.model.index_of(settings.parameter)
     for k in range(len(before.labels)):
@@ -152,7 +157,7 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
         places = locate_label(orbit, before, after, settings, k)
         if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
             places.pop()
-        if not places:
+        if not places and not _vanishes(orbit, k, (before, after), active):
             found.append(not_located(orbit, Kind.T, before, after, settings))
         for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
@@ -160,6 +165,14 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
             b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
             found.append((b, point))
     return _once(found) if orbit.model.joined else found
+
+
+def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) -> bool:
+    """Tell whether the segment of a label, or one next to it, has no length at one of two points."""
+    i, n = int(orbit.system.layout.labels[k][0]), orbit.system.segments
+    near = [(i + step) % n for step in (-1, 0, 1)]
+    motions = (point.orbit(orbit.system, orbit.vector, active) for point in points)
+    return any(np.any((m.ends - m.cycle)[near, 0] < _NO_LENGTH) for m in motions)
 
 
 def _once(found: list[Located]) -> list[Located]:

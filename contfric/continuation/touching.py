@@ -52,24 +52,6 @@ def is_corner(system: System, test: Test, orbit: Orbit) -> bool:
     return abs(rate_along(orbit, mode, test.surface, orbit.ends[test.segment])) > _PASSED
 
 
-@cache
-def begins_to_slide(model: Model, mode: str, surface: str) -> bool:
-    """Tell whether motion that meets a surface goes on sliding on all that it slides on, and on that surface.
-
-    Where another contact sticks meanwhile, a touch of such a surface is a grazing: no rest comes to an end.
-    """
-    own = list(model.domains_of(model.whole_mode(mode)))
-    after = [
-        model.domain_by_name[target].signs
-        for d in own
-        for target in model.targets.get((d.name, surface), ())
-    ]
-    slides_on = {s for s, sign in own[0].signs.items() if all(d.signs.get(s) == 0 for d in own)}
-    return bool(after) and all(
-        all(signs.get(s) == 0 for s in (*slides_on, surface)) for signs in after
-    )
-
-
 def resting_domain(system: System, test: Test) -> Domain | None:
     """Return the domain of rest that a joint is next to, which the surface of a test ends; None if none.
 

@@ -125,5 +125,6 @@ def end_stalled(orbit: Orbit, side: Side, settings: Settings) -> None:
 def _end_at_vertex(
     orbit: Orbit, side: Side, settings: Settings, bifurcation: Bifurcation, point: Point
 ) -> None:
+    side.drop_crowd(point.arc)
     side.put_tip(at_vertex(point, bifurcation.orbit, orbit.model.index_of(settings.parameter)))
     side.end = End(EndReason[bifurcation.kind.name], bifurcation=bifurcation)

@@ -15,6 +15,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
+from contfric.signature.holds import left_surface
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
 #: would be left with depends on them monotonically, one would be enough, as in every model of a load.
@@ -89,8 +90,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
 def _left(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
     """Return the side to which a rest is left into a departing mode, and the observable that tells."""
     model = orbit.model
-    rest = model.domains_of(mode)[0]
-    leaves = next(name for name, sign in rest.signs.items() if sign == 0)
+    leaves = left_surface(model, mode, departs)
     sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
     return sign, model.surface_by_name[leaves].observable
 

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 from contfric.models.definition import Model
 from contfric.signature.holds import (
     departing_mode,
+    ends_rest,
     is_hold,
     known_hold,
+    left_surface,
     pinned_surface,
 )
 
@@ -63,14 +65,14 @@ def holds_of(model: Model, itinerary: Itinerary) -> tuple[Hold, ...]:
         before = itinerary[index - 1]
         if index == 0 or is_hold(before[1]) or not known_hold(exit_, model):
             raise ValueError(f"'{exit_}' cannot stand at place {index + 1} of {itinerary}")
-        rest = model.domains_of(mode)[0]
+        departs = departing_mode(model, before, (mode, exit_))
         found.append(
             Hold(
                 index,
                 pinned_surface(exit_),
-                model.mode_by_name[before[0]].sliding,
-                departing_mode(model, before, (mode, exit_)),
-                next(name for name, sign in rest.signs.items() if sign == 0),
+                ends_rest(model, *before),
+                departs,
+                left_surface(model, mode, departs),
             )
         )
     return tuple(found)

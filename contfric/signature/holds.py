@@ -18,6 +18,7 @@ In a reduced itinerary a hold is the pair (sliding mode, ``hold@...``).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 from contfric.errors import NotationError
 from contfric.models import Model
@@ -79,6 +80,36 @@ def release_mode(model: Model, mode: str, surface: str) -> str | None:
     return None
 
 
+@cache
+def comes_to_rest(model: Model, mode: str, surface: str) -> bool:
+    """Tell whether a mode may be left through a surface to rest on it, and on all that it rests on already.
+
+    Where one contact sticks, another one may come to rest meanwhile: no rest comes to an end.
+    """
+    own, resting = model.domains_of(model.whole_mode(mode)), _rested_on(model, mode)
+    after = (t for d in own for t in model.targets.get((d.name, surface), ()))
+    return any(
+        all(model.domain_by_name[t].signs.get(s) == 0 for s in (*resting, surface)) for t in after
+    )
+
+
+def ends_rest(model: Model, mode: str, exit_: str) -> bool:
+    """Tell whether a segment is a rest that its exit ends."""
+    return bool(model.mode_by_name[mode].sliding) and not comes_to_rest(model, mode, exit_)
+
+
+def left_surface(model: Model, mode: str, departs: str) -> str:
+    """Return the surface of a rest that a departing mode leaves: that of the contact that lets go."""
+    resting, still = _rested_on(model, mode), _rested_on(model, departs)
+    return next((s for s in resting if s not in still), resting[0])
+
+
+def _rested_on(model: Model, mode: str) -> list[str]:
+    """Return the surfaces that a mode moves on, in their order."""
+    first = next(iter(model.domains_of(model.whole_mode(mode))))
+    return [s for s, sign in first.signs.items() if sign == 0 and model.lies_on(mode, s)]
+
+
 def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
     """Return the mode in which a hold is left, from the segment before it.
 
@@ -100,7 +131,7 @@ def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
     found: str | None
     if surface is not None:
         found = release_mode(model, hold[0], surface)
-    elif model.mode_by_name[before[0]].sliding:
+    elif ends_rest(model, *before):
         found = release_mode(model, hold[0], before[1])
     else:
         found = before[0]
@@ -114,18 +145,21 @@ def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
     if not is_hold(segments[index]):
         return model.domain_by_name[segments[index]].mode
     before = model.domain_by_name[segments[index - 1]].mode
-    if model.mode_by_name[before].sliding:
+    after = model.domain_by_name.get(segments[(index + 1) % len(segments)])
+    released = segments[index] == TOUCH and (after is None or after.mode != before)
+    if released and model.mode_by_name[before].sliding:
         return before
+    held = len(_rested_on(model, before))
     rests = [
         mode
         # of several contacts that may come to rest first the one that can from this very domain
         for domain in (segments[index - 1], *(d.name for d in model.domains_of(before)))
         for _, target in model.exits_of(domain)
         if model.mode_by_name[mode := model.domain_by_name[target].mode].sliding
+        and len(_rested_on(model, mode)) > held
     ]
     surface = pinned_surface(segments[index])
     bounded = [m for m in rests if surface is not None and release_mode(model, m, surface)]
-    after = model.domain_by_name.get(segments[(index + 1) % len(segments)])
     if after is not None:  # first the one that is left into what follows
         bounded.sort(key=lambda m: release_mode(model, m, str(surface)) != after.mode)
     return next(iter([*bounded, *rests]), before)
@@ -138,10 +172,10 @@ def surface_into(model: Model, segments: Sequence[str], index: int) -> str | Non
     where it would reverse; a stick touches the surface that releases it the way the hold goes.
     """
     source, hold = segments[index], (index + 1) % len(segments)
-    rests = model.mode_by_name[model.domain_by_name[source].mode].sliding
     beyond = model.domain_by_name[segments[(index + 2) % len(segments)]].mode
-    touches = segments[hold] == TOUCH and not rests
-    wanted = mode_of(model, segments, hold) if touches else beyond
+    rest = mode_of(model, segments, hold)
+    touches = segments[hold] == TOUCH and rest != model.domain_by_name[source].mode
+    wanted = rest if touches else beyond
     for surface, target in model.exits_of(source):
         if model.domain_by_name[target].mode == wanted:
             return surface
@@ -217,7 +251,7 @@ def without_holds(itinerary: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]
         before = itinerary[index - 1]
         if not is_hold(pair[1]):
             found.append(pair)
-        elif not model.mode_by_name[before[0]].sliding:
+        elif not ends_rest(model, *before):
             wanted = departing_mode(model, before, pair)
             found.append((pair[0], _surface_towards(model, pair[0], wanted)))
     return tuple(found)

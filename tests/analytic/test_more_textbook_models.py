@@ -406,6 +406,22 @@ def test_the_next_mode_depends_on_the_one_before(tmp_path) -> None:
     assert [mode for mode, _ in orbit.itinerary].count("may_stop") == 1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_reset_at_a_corner_is_one_event_from_either_side(tmp_path, seed: int) -> None:
+    """Where the upper level is met just as the time to wait is over: the clock starts anew, or goes on.
+
+    The motions of the two branches differ by that clock, and the event has that of the first one.
+    """
+    draw = np.random.default_rng([19, seed])
+    model = model_of(tmp_path, HEATER)
+    params = {"q": draw.uniform(1.8, 2.2), "c": draw.uniform(0.25, 0.35)}
+    diagram = cf.explore(cf.find_orbit(model, params), "wait", (0.05, 1.0))
+    end = params["q"] / params["c"]
+    corner = np.log((end - 1.0) / (end - 1.4)) / params["c"]
+    assert [b.params["wait"] for b in diagram.bifurcations] == [pytest.approx(corner, abs=1e-9)]
+    assert diagram.verify().faults == ()
+
+
 @pytest.mark.parametrize("zone", [0.05, 0.1, 0.2])
 def test_levels_of_one_expression_are_ordered(tmp_path, zone: float) -> None:
     """A servo with a dead zone and friction: no state is above the upper level and below the lower one."""

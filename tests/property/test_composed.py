@@ -10,6 +10,7 @@ import pytest
 import contfric as cf
 from contfric.errors import ModelError, ParameterError
 from contfric.models import structure as reading
+from contfric.signature.holds import comes_to_rest, ends_rest, left_surface
 
 PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7}
 
@@ -182,3 +183,40 @@ def test_forces_that_are_not_affine_are_refused() -> None:
             parameters={"Omega": 1.0, "S": 0.1},
             period="2*pi/Omega",
         )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_contact_may_come_to_rest_while_others_stick(seed: int) -> None:
+    """In random modes: a velocity that vanishes ends no rest of another contact, a limit of a load does."""
+    draw = np.random.default_rng(seed)
+    model = cf.load_model("braced-chain") if seed % 2 else chain(3, 6, "resting")
+    contacts = [s.name for s in model.surfaces if not s.name.endswith(("+", "-"))]
+    mode = "".join(draw.choice(["p", "n", "s"], len(contacts)))
+    checked = 0
+    for i, name in enumerate(contacts):
+        if mode[i] == "s":
+            released = mode[:i] + "p" + mode[i + 1 :]
+            assert left_surface(model, mode, released) == name
+            assert all(ends_rest(model, mode, f"{name}{sign}") for sign in "+-")
+        else:
+            assert comes_to_rest(model, mode, name)
+            assert not ends_rest(model, mode, name)
+        checked += 1
+    assert checked == 3
+
+
+def test_a_tangential_stop_is_a_graze_whatever_else_sticks() -> None:
+    """While one mass of three sticks another one comes to rest without acceleration: nothing is added."""
+    orbit = cf.find_orbit("braced-chain", {"W": 0.424})
+    branch = cf.continue_orbit(orbit, "W", (0.4223, 0.4247))
+    end = branch.ends[0].bifurcation
+    assert end is not None
+    assert end.kind is cf.Kind.GS
+    assert end.params["W"] == pytest.approx(0.42242863571, abs=1e-10)
+    i = end.tests[0].segment
+    mode, surface = end.orbit.itinerary[i]
+    assert "s" in mode
+    observable = end.orbit.model.surface_by_name[surface].observable
+    time, state = float(end.orbit.ends[i, 0]), end.orbit.ends[i, 1:]
+    assert end.orbit.flow.observe(observable, time, state) == pytest.approx(0.0, abs=1e-10)
+    assert abs(end.orbit.flow.rate(mode, observable, time, state)) < 1e-6

@@ -122,6 +122,8 @@ def test_a_stuck_branch_off_the_centre_ends_where_its_slider_begins_to_creep(off
     assert end.bifurcation is not None
     expected = (p["muN"] / p["kt"] - mean) * abs(stiff)
     assert end.bifurcation.params["F"] == pytest.approx(expected, abs=1e-9)
+    # beyond it orbits have other offsets, each of a continuum: their indices are not to be summed
+    assert diagram.verify(restarts=1).passed
 
 
 def slipping(kinetic: str, jenkins: bool = False) -> cf.Model:
@@ -156,3 +158,15 @@ def test_a_motion_that_dies_away_next_to_a_stuck_contact_comes_to_rest() -> None
     assert isinstance(caught.value.result, Trajectory)
     q1, q2, *_, stretch = caught.value.result.last[2]
     assert -q1 + 2.0 * q2 + stretch == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_random_stuck_branch_off_the_centre_has_no_loose_end(seed: int) -> None:
+    """Motions near its end may walk to other orbits: it ends there all the same, and the diagram says why."""
+    draw = np.random.default_rng([59, seed])
+    about = {"W": 1.06, "k": 1.0545, "kt": 2.267, "zeta": 0.01875, "F": 0.86646, "muN": 0.99391}
+    params = {name: value * draw.uniform(0.999, 1.001) for name, value in about.items()}
+    diagram = cf.explore(cf.find_orbit("jenkins", params), "muN", (0.8, 1.17))
+    assert "SHAKEDOWN" in {end.reason.name for branch in diagram.branches for end in branch.ends}
+    assert not diagram.loose_ends
+    assert diagram.verify(restarts=1).passed
