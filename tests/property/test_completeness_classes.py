@@ -69,6 +69,19 @@ def test_the_same_from_every_branch(name: str) -> None:
     assert checked >= len(CLASSES[name])
 
 
+def test_two_margins_that_vanish_together_at_a_singular_point() -> None:
+    """The place is known to the root of rounding: that of a jump of Newton's method is not it."""
+    found = diagram(34, 142)
+    (simple,) = (e for e in found.of_kind("GS") if e.symmetric and e.params["h"] > 0.0559)
+    restarts = found.verify(restarts=6).restarts
+    assert len(restarts) == 6 and all(restart.same for restart in restarts), restarts
+    near = [e for e in found.of_kind("GS") if abs(e.params["h"] - simple.params["h"]) < 1e-6]
+    assert len(near) > 1
+    for event in near:
+        known = event.accuracy * (found.range[1] - found.range[0])
+        assert abs(event.params["h"] - simple.params["h"]) < known
+
+
 @pytest.mark.slow
 def test_many_random_scenes() -> None:
     """Another seed than that of the quick share: no difference outside of the degenerate classes."""
