@@ -44,6 +44,7 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     ),
     "a bridge that is its own image beyond a fold of symmetric orbits": ((34, 112),),
     "an end of a bridge that rounding places anywhere": ((34, 204),),
+    "a stick that a slow load makes short, and that still ends in a jump": ((34, 360),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Others with a branch point or a doubling of a bridge.
@@ -80,6 +81,21 @@ def test_two_margins_that_vanish_together_at_a_singular_point() -> None:
     for event in near:
         known = event.accuracy * (found.range[1] - found.range[0])
         assert abs(event.params["h"] - simple.params["h"]) < known
+
+
+def test_a_slow_load_is_known_well_enough_for_its_bridge() -> None:
+    """Where it stands still a stop is known to the root of rounding, where it is only slow to rounding."""
+    for share in (0.0, 1e-7, -1e-7):
+        found = restarts.scene(34, 360)
+        params = {**found.params, "S": found.params["S"] * (1.0 + share)}
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert not explored.loose_ends, (share, explored.loose_ends)
+        short = [b for b in explored.branches if b.bridge and np.ptp(b.values) < 1e-5]
+        assert short and all(o.admissible for b in short for o in b)
+        ends = [end.bifurcation for b in short for end in b.ends if end.bifurcation is not None]
+        width = found.range[1] - found.range[0]
+        assert all(event.accuracy * width < 0.01 * np.ptp(short[0].values) for event in ends)
 
 
 @pytest.mark.slow
