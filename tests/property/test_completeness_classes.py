@@ -98,6 +98,30 @@ def test_a_slow_load_is_known_well_enough_for_its_bridge() -> None:
         assert all(event.accuracy * width < 0.01 * np.ptp(short[0].values) for event in ends)
 
 
+def test_a_doubling_just_before_a_tangential_release() -> None:
+    """There a multiplier passes -1, then infinity: at the located release its sign is that of rounding."""
+    found = restarts.scene(34, 476)
+    orbit = cf.find_orbit("coulomb", found.params, longest=1000)
+    explored = cf.explore(orbit, found.vary, found.range, max_periods=2, copies=1)
+    branch = next(
+        b
+        for b in explored.branches
+        if b.system.periods == 1 and any(e.kind == "PD" for e in b.bifurcations)
+    )
+    (doubling,) = (e for e in branch.bifurcations if e.kind == "PD")
+    release = branch.ends[1].bifurcation
+    assert release is not None and release.kind == "AS"
+    width = found.range[1] - found.range[0]
+    gap = abs(doubling.params["zeta"] - release.params["zeta"]) / width
+    assert doubling.accuracy < 1e-3 * gap < 1e-8
+    assert any(proposal.branch is not None for proposal in doubling.proposals)
+    for start in (1, 3, 4):
+        for step in (None, 0.0062, 0.003, 0.001):
+            again = cf.continue_orbit(branch[start], found.vary, found.range, max_step=step)
+            (event,) = (e for e in again.bifurcations if e.kind == "PD")
+            assert abs(event.params["zeta"] - doubling.params["zeta"]) < 1e-10 * width
+
+
 @pytest.mark.slow
 def test_many_random_scenes() -> None:
     """Another seed than that of the quick share: no difference outside of the degenerate classes."""
