@@ -14,6 +14,7 @@ import pytest
 
 import contfric as cf
 from contfric.continuation.along_curve import Line
+from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
 from contfric.continuation.report import ROUGH
 
@@ -120,6 +121,44 @@ def test_a_doubling_just_before_a_tangential_release() -> None:
             again = cf.continue_orbit(branch[start], found.vary, found.range, max_step=step)
             (event,) = (e for e in again.bifurcations if e.kind == "PD")
             assert abs(event.params["zeta"] - doubling.params["zeta"]) < 1e-10 * width
+
+
+@pytest.mark.parametrize("limit", [0.3, 0.33])
+def test_a_bridge_that_ends_at_a_symmetric_orbit(limit: float) -> None:
+    """There its hold is as long as the stick of the other half, and another curve crosses.
+
+    Tangents are rounding at that point. A fold was named where their slope jumps, and the search for what
+    turns there ended with an error: one half of the motion has a hold, the other none.
+    """
+    params = {"Omega": 0.5, "S": 0.25, "S0": limit, "h": 0.0, "zeta": 0.0}
+    found = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
+    verified = found.verify()
+    assert len(verified.restarts) == 6 and verified.passed, str(verified)
+    (bridge,) = (
+        b
+        for b in found.branches
+        if b.bridge
+        and not b.mirrored
+        and not b.symmetric
+        and any(end.bifurcation is not None and end.bifurcation.symmetric for end in b.ends)
+    )
+    for k in range(2, len(bridge) - 2, 3):
+        again = cf.continue_orbit(bridge[k], "Omega", (0.4, 0.6), max_step=0.0062)
+        assert not [event for event in again.bifurcations if event.kind == "SN"]
+
+
+def test_units_that_differ_in_their_holds_have_no_arms() -> None:
+    """An orbit near a symmetric one may have a hold in one half and a stick in the other."""
+    params = {"Omega": 0.5, "S": 0.25, "S0": 0.33, "h": 0.0, "zeta": 0.0}
+    found = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
+    checked = 0
+    for branch in (b for b in found.branches if b.bridge and not b.symmetric):
+        for event in (end.bifurcation for end in branch.ends if end.bifurcation is not None):
+            whole = event.orbit.as_whole()
+            if event.symmetric and len(whole.system.holds) == 1:
+                assert arms_at(event.orbit) is None
+                checked += 1
+    assert checked
 
 
 @pytest.mark.slow
