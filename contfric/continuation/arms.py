@@ -143,15 +143,22 @@ class Arms:
 
 
 def arms_at(orbit: Orbit) -> Arms | None:
-    """Return what turns by itself at a fold; None if nothing does."""
+    """Return what turns by itself at a fold; None if nothing does.
+
+    Nor is there an answer where the units of the motion differ in their holds: where a hold is as long as
+    the stick of another unit, the fold is not one of the unit's orbits.
+    """
     if orbit.model.autonomous or not orbit.system.holds:
         return None
     whole = orbit.as_whole()
     unit = unit_of(whole)
+    parts = pieces(whole, unit)
     try:
-        form = form_of(whole, np.zeros(len(whole.itinerary)), unit, pieces(whole, unit)[0], "")
+        form = form_of(whole, np.zeros(len(whole.itinerary)), unit, parts[0], "")
         fold = form.orbit
     except (NotationError, ValueError):
+        return None
+    if len(fold.system.holds) * len(parts) != len(whole.system.holds):
         return None
     if turning := turning_passages(fold):
         return Arms(unit, fold, turning)

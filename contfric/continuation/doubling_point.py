@@ -28,7 +28,7 @@ _FAR = 1e-2
 _SECANTS = 40
 #: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it; and a
 #: shorter one, where a fold is so near that there is no orbit on one side.
-_BESIDE = (1e-6, 1e-8)
+_BESIDE = (1e-6, 1e-8, 1e-10)
 #: What vanishes at an opening is the difference of matrices of order 1: its rounding, with some reserve.
 _ROUNDING = 1e-13
 #: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
@@ -76,15 +76,20 @@ def opening(orbit: Orbit) -> float:
 def opens_through(orbit: Orbit, active: int) -> bool:
     """Tell whether a multiplier of the turn passes -1 at a vertex, and does not only touch it.
 
-    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding. Where a fold is so
+    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding. Next to an exit that
+    becomes tangential it passes -1 and then infinity: a shorter way tells that it passes. Where a fold is so
     near that there is no orbit on one side of the parameter the curve of orbits is asked.
     """
-    value = float(orbit.vector[active])
+    value, told = float(orbit.vector[active]), False
     for beside in _BESIDE:
         offset = beside * (1.0 + abs(value))
         sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
-        if np.all(np.isfinite(sides)):
-            return sides[0] * sides[1] < 0.0
+        if np.all(np.isfinite(sides)) and min(np.abs(sides)) > _ROUNDING:
+            told = True
+            if sides[0] * sides[1] < 0.0:
+                return True
+    if told:
+        return False
     line = Line.through(orbit, active)
     along = [] if line is None else [line.at(s * _BESIDE[0]) for s in (-1.0, 1.0)]
     sides = [opening(there) for there in along if there is not None]

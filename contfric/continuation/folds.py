@@ -31,6 +31,8 @@ _MARGINAL = 1e-5
 NEAR_ONE = 0.1
 #: What it may change by over a step, relative to the range, where it is constant: the root of rounding.
 _CONSTANT = 1e-7
+#: A located fold has a slope of rounding; this share of those around it is left at a jump only.
+_LEFT = 0.1
 #: A step shorter than this (arclength) is not taken back: there is nothing to be found in between.
 SHORTEST_LEAP = 1e-7
 #: An event with the point of the branch at which it is.
@@ -55,8 +57,9 @@ def fold_between(
     split = _split_between(orbit, before, after, share, settings)
     if split is not None:
         return [split]
-    vertical = _is_vertical(before, after, settings)
-    return [] if vertical else [not_located(orbit, Kind.SN, before, beyond, settings)]
+    if _is_vertical(before, after, settings) or _jumps_at_end(before, after):
+        return []
+    return [not_located(orbit, Kind.SN, before, beyond, settings)]
 
 
 def _split_between(
@@ -91,7 +94,7 @@ def fold_at(
     split = as_split(vertex[0], point.tangent)
     if split is not None:
         return [(split, point)]
-    vertical = _is_vertical(before, after, settings, point)
+    vertical = _is_vertical(before, after, settings, point) or _is_jump(before, point, after)
     return [] if vertical or _is_idle(orbit, before, point, after, settings) else [vertex]
 
 
@@ -159,6 +162,25 @@ def _is_vertical(
         least = _ROUNDING * (1.0 + abs(between.value))
         return not (gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > least)
     return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
+
+
+def _is_jump(before: Point, point: Point, after: Point) -> bool:
+    """Tell whether a slope changes its sign without being zero in between: no fold.
+
+    Where two curves cross at the end of a branch trials end on either, and the sign is that of two curves.
+    """
+    return abs(point.slope) > _LEFT * max(abs(before.slope), abs(after.slope))
+
+
+def _jumps_at_end(before: Point, after: Point) -> bool:
+    """Tell whether the parameter changes over a step as if only one of the two slopes were true.
+
+    At an event at which another curve crosses the equations are singular, and the tangent is rounding. At a
+    fold the slope changes over the whole step, and its mean lies between those at the ends.
+    """
+    length, turns = after.arc - before.arc, abs(after.slope - before.slope)
+    mean = (after.value - before.value) / length
+    return min(abs(mean - before.slope), abs(mean - after.slope)) < _LEFT * turns
 
 
 def _is_idle(orbit: Orbit, before: Point, point: Point, after: Point, settings: Settings) -> bool:

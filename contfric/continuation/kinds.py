@@ -47,10 +47,9 @@ from contfric.signature.holds import ends_rest
 #: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
 #: times a rate of the load, and Newton may fail before they are below 1e-5.
 _VANISHED = 1e-3
-#: A load that changes this slowly at a stop stands still there.
-STILL = 1e-4
-#: Where its rate is rounding: a stop at a minimum is known to the root of that.
-_ROUNDED = 1e-6
+#: A load that changes this slowly at a stop stands still there: a stop at a minimum is known to the root of
+#: rounding. Where it changes faster, a stick as short as its rate still ends in a jump.
+ROUNDED = 1e-6
 #: Time, in periods, by which it is asked before and behind a stop whether it turns there.
 _LATER = 1e-4
 
@@ -129,7 +128,7 @@ def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
     """
     rate = outward_rate(system, test, orbit)
     resting = resting_domain(system, test)
-    if resting is None or abs(rate) >= _ROUNDED:
+    if resting is None or abs(rate) >= ROUNDED:
         return rate > 0.0
     sign, end = resting.signs[test.surface], orbit.ends[test.segment]
     return bends_outward(orbit, resting.mode, test.surface, sign, end)

@@ -6,7 +6,7 @@ parameter, arclength, labels, multipliers) is copied out of the rows when they a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -280,3 +280,12 @@ def first_point(
     course = Course(options, settings.box, -1, *start, 0, rows.arrays(1), tally())
     why, _, _ = march(branch_problem(orbit, settings), course)
     return None if why == BROKEN else rows.point(0)
+
+
+def point_before(here: Orbit, point: Point, back: float, settings: Settings) -> Point | None:
+    """Solve for the point of a branch this far (in arclength) before one; ``here`` is the orbit at that."""
+    vector = here.vector.copy()
+    vector[here.model.index_of(settings.parameter)] -= back * point.slope
+    moved = replace(here, joints=here.joints - back * point.tangent, vector=vector)
+    found = first_point(moved, settings, point.tangent, point.slope)
+    return None if found is None else replace(found, arc=point.arc - back)

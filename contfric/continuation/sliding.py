@@ -9,7 +9,7 @@ from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_mar
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
-from contfric.continuation.side import first_point
+from contfric.continuation.side import point_before
 from contfric.continuation.touching import is_rate_of, rate_along
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test, inside_sign
@@ -27,7 +27,7 @@ ROUGHLY_REACHED = 1e-4
 #: The same where several holds end at once; what their lengths do to the orbit is the square of it.
 _NEARLY_REACHED = 1e-5
 #: How far a located point is moved back (arclength): where a slide vanishes joints are known to no more.
-_BACK = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8)
+_BACK = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7)
 #: A margin this negative is no rounding of a sum of a few terms of order 1.
 _NEGATIVE = 1e-14
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -100,11 +100,10 @@ def _pulled_in(
     if point.lost or _is_inside(here):
         return point, here
     for back in _BACK:
-        moved = replace(here, joints=here.joints - back * point.tangent)
-        nearer = first_point(moved, settings, point.tangent, point.slope)
+        nearer = point_before(here, point, back, settings)
         there = None if nearer is None else nearer.orbit(orbit.system, orbit.vector, active)
         if nearer is not None and there is not None and _is_inside(there):
-            return replace(nearer, arc=point.arc - back), there
+            return nearer, there
     return point, here
 
 
@@ -213,13 +212,22 @@ def _grazed_limit(here: Orbit, point: Point, first: int) -> int:
 def _located_before(
     orbit: Orbit, before: Point, point: Point, settings: Settings
 ) -> list[tuple[int, Point]]:
-    """Return the margins violated at a located event: they vanish before it, and come back behind."""
+    """Return the margins violated at a located event: they vanish before it, and come back behind.
+
+    Where several margins vanish together at a singular point, each is known there to the root of rounding,
+    and so is the tangent that trials are predicted with: they may end on another curve. A place at which
+    more of a margin is left than the event misses it by is such a jump, and no zero.
+    """
     from contfric.continuation.bracket import BY_TEST
 
     tests = point.tests[: len(orbit.system.tests)].tolist()
     violated = (k for k, value in enumerate(tests) if value < -_TOGETHER)
     found = [(k, locate_change(orbit, before, point, settings, BY_TEST, k)) for k in violated]
-    return [(k, p) for k, p in found if p is not None and p.arc < point.arc]
+    return [
+        (k, p)
+        for k, p in found
+        if p is not None and p.arc < point.arc and abs(p.tests[k]) <= abs(point.tests[k])
+    ]
 
 
 def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:

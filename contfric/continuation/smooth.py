@@ -21,6 +21,7 @@ from contfric.continuation.folds import (
 from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
+from contfric.continuation.side import point_before
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
@@ -33,6 +34,8 @@ SAME_PLACE = 1e-7
 SAME_TANGENCY = 2e-6
 #: A segment this short has no length: an event at which it comes in is located to the root of rounding.
 _NO_LENGTH = 1e-6
+#: A multiplier this large is that of an exit without a rate.
+_INFINITE = 1e8
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -45,8 +48,8 @@ def smooth_events(
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(before.tests) - EXTRA
-    # events behind a sliding one do not happen; where a stop becomes tangential multipliers are infinite
-    after = beyond if np.isfinite(beyond.tests[base:]).all() else after
+    # events behind a sliding one do not happen
+    after = _last_told(orbit, beyond, settings) or after
     values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
     found: list[Located] = []
     folded = False
@@ -82,6 +85,21 @@ def smooth_events(
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
+    """Return the last point at which the signs of multipliers are told; None if there is none.
+
+    Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event
+    it is infinite, or its sign is that of a rate that is rounding.
+    """
+    if not np.isfinite(beyond.tests[-EXTRA:]).all():
+        return None
+    if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
+        return beyond
+    here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    told = point_before(here, beyond, SAME_PLACE, settings)
+    return told if told is not None and np.isfinite(told.tests[-EXTRA:]).all() else None
 
 
 def _at_multiplier(

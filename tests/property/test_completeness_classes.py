@@ -14,6 +14,7 @@ import pytest
 
 import contfric as cf
 from contfric.continuation.along_curve import Line
+from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
 from contfric.continuation.report import ROUGH
 
@@ -44,6 +45,7 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     ),
     "a bridge that is its own image beyond a fold of symmetric orbits": ((34, 112),),
     "an end of a bridge that rounding places anywhere": ((34, 204),),
+    "a stick that a slow load makes short, and that still ends in a jump": ((34, 360),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Others with a branch point or a doubling of a bridge.
@@ -67,6 +69,96 @@ def test_the_same_from_every_branch(name: str) -> None:
         assert found.passed, (seed, index, str(found))
         checked += len(found.restarts)
     assert checked >= len(CLASSES[name])
+
+
+def test_two_margins_that_vanish_together_at_a_singular_point() -> None:
+    """The place is known to the root of rounding: that of a jump of Newton's method is not it."""
+    found = diagram(34, 142)
+    (simple,) = (e for e in found.of_kind("GS") if e.symmetric and e.params["h"] > 0.0559)
+    restarts = found.verify(restarts=6).restarts
+    assert len(restarts) == 6 and all(restart.same for restart in restarts), restarts
+    near = [e for e in found.of_kind("GS") if abs(e.params["h"] - simple.params["h"]) < 1e-6]
+    assert len(near) > 1
+    for event in near:
+        known = event.accuracy * (found.range[1] - found.range[0])
+        assert abs(event.params["h"] - simple.params["h"]) < known
+
+
+def test_a_slow_load_is_known_well_enough_for_its_bridge() -> None:
+    """Where it stands still a stop is known to the root of rounding, where it is only slow to rounding."""
+    for share in (0.0, 1e-7, -1e-7):
+        found = restarts.scene(34, 360)
+        params = {**found.params, "S": found.params["S"] * (1.0 + share)}
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert not explored.loose_ends, (share, explored.loose_ends)
+        short = [b for b in explored.branches if b.bridge and np.ptp(b.values) < 1e-5]
+        assert short and all(o.admissible for b in short for o in b)
+        ends = [end.bifurcation for b in short for end in b.ends if end.bifurcation is not None]
+        width = found.range[1] - found.range[0]
+        assert all(event.accuracy * width < 0.01 * np.ptp(short[0].values) for event in ends)
+
+
+def test_a_doubling_just_before_a_tangential_release() -> None:
+    """There a multiplier passes -1, then infinity: at the located release its sign is that of rounding."""
+    found = restarts.scene(34, 476)
+    orbit = cf.find_orbit("coulomb", found.params, longest=1000)
+    explored = cf.explore(orbit, found.vary, found.range, max_periods=2, copies=1)
+    branch = next(
+        b
+        for b in explored.branches
+        if b.system.periods == 1 and any(e.kind == "PD" for e in b.bifurcations)
+    )
+    (doubling,) = (e for e in branch.bifurcations if e.kind == "PD")
+    release = branch.ends[1].bifurcation
+    assert release is not None and release.kind == "AS"
+    width = found.range[1] - found.range[0]
+    gap = abs(doubling.params["zeta"] - release.params["zeta"]) / width
+    assert doubling.accuracy < 1e-3 * gap < 1e-8
+    assert any(proposal.branch is not None for proposal in doubling.proposals)
+    for start in (1, 3, 4):
+        for step in (None, 0.0062, 0.003, 0.001):
+            again = cf.continue_orbit(branch[start], found.vary, found.range, max_step=step)
+            (event,) = (e for e in again.bifurcations if e.kind == "PD")
+            assert abs(event.params["zeta"] - doubling.params["zeta"]) < 1e-10 * width
+
+
+@pytest.mark.parametrize("limit", [0.3, 0.33])
+def test_a_bridge_that_ends_at_a_symmetric_orbit(limit: float) -> None:
+    """There its hold is as long as the stick of the other half, and another curve crosses.
+
+    Tangents are rounding at that point. A fold was named where their slope jumps, and the search for what
+    turns there ended with an error: one half of the motion has a hold, the other none.
+    """
+    params = {"Omega": 0.5, "S": 0.25, "S0": limit, "h": 0.0, "zeta": 0.0}
+    found = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
+    verified = found.verify()
+    assert len(verified.restarts) == 6 and verified.passed, str(verified)
+    (bridge,) = (
+        b
+        for b in found.branches
+        if b.bridge
+        and not b.mirrored
+        and not b.symmetric
+        and any(end.bifurcation is not None and end.bifurcation.symmetric for end in b.ends)
+    )
+    for k in range(2, len(bridge) - 2, 3):
+        again = cf.continue_orbit(bridge[k], "Omega", (0.4, 0.6), max_step=0.0062)
+        assert not [event for event in again.bifurcations if event.kind == "SN"]
+
+
+def test_units_that_differ_in_their_holds_have_no_arms() -> None:
+    """An orbit near a symmetric one may have a hold in one half and a stick in the other."""
+    params = {"Omega": 0.5, "S": 0.25, "S0": 0.33, "h": 0.0, "zeta": 0.0}
+    found = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
+    checked = 0
+    for branch in (b for b in found.branches if b.bridge and not b.symmetric):
+        for event in (end.bifurcation for end in branch.ends if end.bifurcation is not None):
+            whole = event.orbit.as_whole()
+            if event.symmetric and len(whole.system.holds) == 1:
+                assert arms_at(event.orbit) is None
+                checked += 1
+    assert checked
 
 
 @pytest.mark.slow
