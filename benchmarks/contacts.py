@@ -2,7 +2,7 @@
 
 ``python benchmarks/contacts.py``: 20 masses on springs of their own and between neighbours, a harmonic force
 on the first mass. Some masses rub on the ground. No mode and no itinerary is given. Each size is a process of
-its own, with compiled kernels on disk.
+its own, with compiled kernels on disk; so is each of some structures with random data.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,37 +22,70 @@ HEADING = "## Many friction contacts"
 MASSES, CONTACTS = 20, (1, 2, 3, 4, 6, 8, 10)
 COUPLING, DAMPING, KINETIC, OMEGA, RANGE = 0.5, 0.02, 0.03, 1.0, (0.999, 1.03)
 MAX_STEP = 0.01
+#: Seeds of structures with random data, and how far to either side of the lowest natural frequency.
+SEEDS, WIDTH = (0, 1, 2), 0.03
 
 
-def measure(contacts: int) -> dict[str, float]:
+@dataclass(frozen=True)
+class Row:
+    """Masses on springs of their own and between neighbours: which of them rub, how much, and the range."""
+
+    name: str
+    mass: np.ndarray
+    stiffness: np.ndarray
+    rubs: dict[int, str]
+    omega: float
+    reach: tuple[float, float]
+
+
+def regular(contacts: int) -> Row:
+    """Return equal masses, of which every so many rub."""
+    beside = np.eye(MASSES, k=1) + np.eye(MASSES, k=-1)
+    stiffness = np.eye(MASSES) + COUPLING * (np.diag(np.sum(beside, axis=1)) - beside)
+    rubs = {i * (MASSES // contacts): "S" for i in range(1, contacts + 1)}
+    return Row(str(contacts), np.eye(MASSES), stiffness, rubs, OMEGA, RANGE)
+
+
+def drawn(seed: int) -> Row:
+    """Return random masses, springs and friction, ten of the masses rubbing."""
+    draw = np.random.default_rng(seed)
+    beside = np.diag(draw.uniform(0.6, 1.4, MASSES - 1) * COUPLING, 1)
+    beside = beside + beside.T
+    stiffness = np.diag(draw.uniform(0.8, 1.2, MASSES) + beside.sum(axis=1)) - beside
+    mass = np.diag(draw.uniform(0.8, 1.2, MASSES))
+    which = np.sort(draw.choice(np.arange(1, MASSES + 1), 10, replace=False))
+    rubs = {int(i): f"{draw.uniform(0.5, 1.5):.4f}*S" for i in which}
+    low = float(np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real.min()))
+    reach = (1.0 - WIDTH) * low, (1.0 + WIDTH) * low
+    return Row(f"10, random {seed}", mass, stiffness, rubs, low, reach)
+
+
+def measure(row: Row) -> dict[str, float | str]:
     """Return seconds of each step, and counts."""
     import contfric as cf
 
-    beside = np.eye(MASSES, k=1) + np.eye(MASSES, k=-1)
-    stiffness = np.eye(MASSES) + COUPLING * (np.diag(np.sum(beside, axis=1)) - beside)
-    every = MASSES // contacts
     rubs = {
-        f"b{i}": {"kind": "friction", "velocity": f"v{i * every}", "kinetic": "S"}
-        for i in range(1, contacts + 1)
+        f"b{k}": {"kind": "friction", "velocity": f"v{i}", "kinetic": kinetic}
+        for k, (i, kinetic) in enumerate(row.rubs.items(), start=1)
     }
-    clock = [time.perf_counter()]
+    clock = [time.process_time()]
     model = cf.Mechanism(
-        np.eye(MASSES),
-        DAMPING * stiffness,
-        stiffness,
+        row.mass,
+        DAMPING * row.stiffness,
+        row.stiffness,
         contacts=rubs,
         force={"q1": "cos(Omega*t)"},
-        parameters={"Omega": OMEGA, "S": KINETIC},
+        parameters={"Omega": row.omega, "S": KINETIC},
         period="2*pi/Omega",
     )
-    clock.append(time.perf_counter())
+    clock.append(time.process_time())
     orbit = cf.find_orbit(model, periods=1)
-    clock.append(time.perf_counter())
-    diagram = cf.explore(orbit, "Omega", RANGE, max_step=MAX_STEP, max_periods=1)
-    clock.append(time.perf_counter())
+    clock.append(time.process_time())
+    diagram = cf.explore(orbit, "Omega", row.reach, max_step=MAX_STEP, max_periods=1)
+    clock.append(time.process_time())
     load, first, curve = np.diff(clock)
     return {
-        "contacts": contacts,
+        "contacts": row.name,
         "load": load,
         "orbit": first,
         "curve": curve,
@@ -66,11 +100,13 @@ def measure(contacts: int) -> dict[str, float]:
 def main() -> None:
     """Measure each size in a process of its own, and write the part of the page."""
     if len(sys.argv) > 1:
-        print(json.dumps(measure(int(sys.argv[1]))))
+        kind, number = sys.argv[1:]
+        row = drawn(int(number)) if kind == "drawn" else regular(int(number))
+        print(json.dumps(measure(row)))
         return
     rows = []
-    for contacts in CONTACTS:
-        command = [sys.executable, __file__, str(contacts)]
+    for kind, number in [*(("regular", n) for n in CONTACTS), *(("drawn", n) for n in SEEDS)]:
+        command = [sys.executable, __file__, kind, str(number)]
         found = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
         print(found, flush=True)
         rows.append(
@@ -81,11 +117,12 @@ def main() -> None:
         f"Written by `make bench` (`benchmarks/contacts.py`): {origin()}. "
         f"{MASSES} masses on springs of their own (1) and between "
         f"neighbours ({COUPLING}), damping {DAMPING} K, a force cos(Omega t) on the first; friction S = "
-        f"{KINETIC} of some masses against the ground. Seconds in one process on one core: load, first orbit "
+        f"{KINETIC} of some masses against the ground. Seconds of the processor: load, first orbit "
         f"(simulated), and the response curve over Omega in [{RANGE[0]}, {RANGE[1]}], from near the peak "
         "down, with multipliers and admissibility at every point, every event located and followed. No "
         "mode is given: those that were visited are counted (59049 can be). Below 0.9977 the orbits of ten "
-        "contacts lose their stability (NS)."
+        "contacts lose their stability (NS). Last rows: masses, springs and friction drawn at random, over "
+        f"{100 * WIDTH:.0f} % to either side of the lowest natural frequency."
     )
     head = (
         "| contacts | load | first orbit | its segments | curve | points | events | loose ends | modes "

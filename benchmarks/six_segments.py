@@ -1,7 +1,8 @@
 """Time for a point of a branch of six segments against the number of states; docs/benchmarks-states.md.
 
 ``python benchmarks/six_segments.py``: the chain of ``states.py`` with its first mass on friction, under a
-force with a third harmonic and a constant part, along the amplitude of the force, which is in no matrix.
+force with a third harmonic and a constant part, along the amplitude of the force, which is in no matrix, and
+along a factor of the stiffness, which makes every matrix another one at each point.
 Seconds of the processor, in turns with a yardstick.
 """
 
@@ -31,18 +32,19 @@ CASES = ((1, 0.25, 0.1), (10, 0.3, 0.2), (12, 0.3, 0.2))
 ROUNDS, WIDTH, POINTS = 5, 2e-3, 1000
 
 
-def chain(n: int) -> cf.Model:
-    """Return the chain as a model."""
+def chain(n: int, factor: bool = False) -> cf.Model:
+    """Return the chain as a model; with a parameter k that multiplies its stiffness, if that is asked for."""
     stiffness = stiffness_of(n)
+    scaled = [[f"{entry!r}*k" if entry else "0" for entry in row] for row in stiffness.tolist()]
     return cf.Mechanism(
         np.eye(n),
         DAMPING * stiffness + 0.05 * np.eye(n),
-        stiffness,
+        scaled if factor else stiffness,
         contacts={"pad": {"kind": "friction", "velocity": "v1", "kinetic": "S"}},
         force={f"q{n}": "F*cos(w*t) + 0.6*F*cos(3*w*t) + 0.02"},
-        parameters={"w": 0.3, "F": 0.6, "S": 0.2},
+        parameters={"w": 0.3, "F": 0.6, "S": 0.2} | ({"k": 1.0} if factor else {}),
         period="2*pi/w",
-        name=f"six-{n}",
+        name=f"six-{n}" + "-k" * factor,
     )
 
 
@@ -59,24 +61,30 @@ def least(calls: dict[str, Callable[[], Any]]) -> dict[str, tuple[float, Any]]:
 
 def row_of(n: int, w: float, friction: float) -> str:
     """Measure one chain."""
-    orbit = cf.find_orbit(chain(n), {"w": w, "F": 0.6, "S": friction})
-    assert orbit.system.segments == 6
+    at = {"w": w, "F": 0.6, "S": friction}
+    orbits = {"F": cf.find_orbit(chain(n), at), "k": cf.find_orbit(chain(n, True), at)}
+    assert all(orbit.system.segments == 6 for orbit in orbits.values())
     numbers = np.random.default_rng(1).normal(size=200_000)
-    reach = 0.6, 0.6 + WIDTH
 
-    def branch(stability: bool) -> Callable[[], cf.Branch]:
-        step = 2.0 / POINTS
-        return lambda: cf.continue_orbit(orbit, "F", reach, max_step=step, stability=stability)
+    def branch(parameter: str, stability: bool) -> Callable[[], cf.Branch]:
+        step, orbit = 2.0 / POINTS, orbits[parameter]
+        value = orbit.params[parameter]
+        reach = value, value + WIDTH
+        return lambda: cf.continue_orbit(
+            orbit, parameter, reach, max_step=step, stability=stability
+        )
 
     found = least(
         {
             "yard": lambda: np.sort(numbers),
-            "plain": branch(False),
-            "stable": branch(True),
+            "plain": branch("F", False),
+            "stable": branch("F", True),
+            "matrix": branch("k", False),
+            "matrix-stable": branch("k", True),
         }
     )
     cells = [str(2 * n), str(len(found["plain"][1]))]
-    cells += [f"{1e6 * found[k][0] / len(found[k][1]):.0f}" for k in ("plain", "stable")]
+    cells += [f"{1e6 * found[k][0] / len(found[k][1]):.0f}" for k in list(found)[1:]]
     return "| " + " | ".join([*cells, f"{1e3 * found['yard'][0]:.0f}"]) + " |"
 
 
@@ -88,15 +96,16 @@ def main() -> None:
         "",
         f"Written by `make bench` (`benchmarks/six_segments.py`): {origin()}. "
         "The chain above under F (cos wt + 0.6 cos 3wt) + 0.02, "
-        "its first mass on friction S; orbits of six segments along F, which is in no matrix. Microseconds "
+        "its first mass on friction S; orbits of six segments along F, which is in no matrix, and along a "
+        "factor k of the stiffness, with which every matrix is another one at each point. Microseconds "
         "of the processor for a point: prediction, Newton's method, all margins with their stationary "
         f"points; and with multipliers. The least of {ROUNDS} branches in turns with a yardstick (200,000 "
         "numbers sorted, milliseconds), all that a call costs divided by its points. Beyond six "
         "states most of each motion is kept from point to point (docs/integration.md), which is part of "
         "the time of the first points.",
         "",
-        "| states | points | a point | with multipliers | yardstick |",
-        "|---|---|---|---|---|",
+        "| states | points | a point | with multipliers | along k | with multipliers | yardstick |",
+        "|---|---|---|---|---|---|---|",
         *rows,
     ]
     text = PAGE.read_text(encoding="utf-8")

@@ -12,9 +12,9 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
 from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
+from contfric.continuation.passed_families import with_families
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.vertical import with_families
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 

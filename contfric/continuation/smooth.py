@@ -21,7 +21,7 @@ from contfric.continuation.folds import (
 from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
-from contfric.continuation.side import point_before
+from contfric.continuation.side import first_point, point_before
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
@@ -36,6 +36,9 @@ SAME_TANGENCY = 2e-6
 _NO_LENGTH = 1e-6
 #: A multiplier this large is that of an exit without a rate.
 _INFINITE = 1e8
+#: A function of the multipliers that changes by more than the second share of its change over a step, over
+#: the first share of the step, is rounding; the longest step over which that is asked.
+_NUDGE, _ERRATIC, _SHORT = 1e-3, 0.1, 1e-3
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -58,6 +61,8 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
+        if column != FOLD and _is_rounding(orbit, before, after, base + column, settings):
+            continue
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         may_cross = column == CHI_ONE and orbit.model.symmetry is None
         if may_cross and not _passes_vertex(orbit, before, after, share, settings):
@@ -100,6 +105,35 @@ def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
     here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     told = point_before(here, beyond, SAME_PLACE, settings)
     return told if told is not None and np.isfinite(told.tests[-EXTRA:]).all() else None
+
+
+def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings: Settings) -> bool:
+    """Tell whether a function of the multipliers changes its sign over a short step by rounding.
+
+    Where a slip shrinks to nothing, of duration d, its ends are reached at rates of order d and d^2: times
+    of events, and with them multipliers, are known to the rounding over the product of these rates, while
+    the orbit is known well. What changes smoothly changes in proportion to the step, or like its root at an
+    end; rounding is as large between two points however near they are.
+    """
+    step = after.arc - before.arc
+    if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
+        return False
+    over_step = abs(float(after.tests[index] - before.tests[index]))
+    return any(
+        _change_next_to(orbit, point, shift * step, index, settings) > _ERRATIC * over_step
+        for point, shift in ((before, _NUDGE), (after, -_NUDGE))
+    )
+
+
+def _change_next_to(
+    orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
+) -> float:
+    """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
+    vector = orbit.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] = point.value + shift * point.slope
+    moved = Orbit(orbit.system, point.joints + shift * point.tangent, vector, np.inf)
+    near = first_point(moved, settings, point.tangent, point.slope)
+    return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
 
 
 def _at_multiplier(

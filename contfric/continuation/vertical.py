@@ -12,14 +12,12 @@ this parameter knows it to the root of rounding only, takes the sign of its slop
 lost. Two things are regular, though.
 
 * **The value.** With w the left null vector of F_z, ``w F_b = 2 c b`` passes zero at the family's value,
-  which is located to rounding by secants. F is made as small as it can be at each trial (Gauss and Newton).
+  which is located to rounding by secants. All of F but its part along w vanishes at each trial: with v the
+  right null vector, Newton's corrections dz solve ``F_z dz + s w = -F``, ``v dz = 0``, which is regular.
 * **Another parameter q**, with ``w F_q`` not zero (the damping). In (z, q) the family is a curve with a
   unique tangent and q constant: it is traced along q by the ordinary march, with all events that end it.
 
 Where g vanishes identically, orbits are a family at each value of the parameter: that is not treated here.
-
-Where a symmetric branch passes the family a multiplier of its half touches -1, with the square of the
-distance: no test changes its sign there. It is looked for where a multiplier comes near -1 and leaves again.
 """
 
 from __future__ import annotations
@@ -27,25 +25,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import TERMINAL, Bifurcation, End, Kind
-from contfric.continuation.openings import in_order
+from contfric.continuation.events import TERMINAL, Bifurcation, End
 from contfric.continuation.points import Settings
 from contfric.continuation.report import ROUGH
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at, null_space
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import refine
 
 #: Smallest singular value of the equations (joints alone), relative to the largest, next to a family.
 _NEARLY = 1e-2
 #: Distances along the family (root mean square of joints) at which an orbit inside of it is looked for.
 _INSIDE = (1e-2, -1e-2, 1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5)
-#: Steps of Gauss and Newton at one value, and trials of the value.
+#: Steps of Newton's method at one value, and trials of the value.
 _STEPS, _TRIALS = 8, 12
 #: Second trial of the value, and how far from the first it may be found (relative to 1 + its size).
 _TRIAL, _FAR = 1e-6, 1e-2
@@ -60,8 +55,10 @@ _ROUNDED, _CONSTANT = 1e-12, 1e-11
 _FLAT, _OPENS = 1e-6, 1e-4
 #: Null vectors of the equations with the parameter.
 _PLANE = 2
-#: A multiplier of a symmetric branch that comes this near to -1 and leaves again is asked for a family.
-_TOUCHES = 1e-2
+
+
+#: The left and the right null vector of the equations, w and v.
+Border = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,42 +135,49 @@ def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> Family | Non
     """
     if orbit.model.autonomous or orbit.system.holds:
         return None
-    whole = orbit.as_whole()
-    _, size, right = np.linalg.svd(equations_at(whole.system, whole.joints, whole.vector)[1])
+    try:
+        return _next_to(orbit.as_whole(), active, within)
+    except np.linalg.LinAlgError:  # with its border singular: more than one null vector
+        return None
+
+
+def _next_to(whole: Orbit, active: int, within: float) -> Family | None:
+    """Return the family next to an orbit on its whole period."""
+    by_joints = equations_at(whole.system, whole.joints, whole.vector, False)[1]
+    left, size, right = np.linalg.svd(by_joints)
     if size[-1] > _NEARLY * size[0]:
         return None
+    border = left[:, -1], right[-1]
     along = right[-1].reshape(whole.joints.shape)
     along = along * np.sqrt(len(along)) / np.linalg.norm(along)
     first = replace(whole, joints=whole.joints + _INSIDE[0] * along)
-    joints = _least(first, whole.vector)
+    joints = _reduced(first, whole.vector, border)
     if joints is None:
         return None
-    residual, _, _ = equations_at(whole.system, joints, whole.vector)
+    residual, _, _ = equations_at(whole.system, joints, whole.vector, False)
     if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 near an orbit of a family
         return None
     for distance in _INSIDE:
         moved = replace(whole, joints=whole.joints + distance * along)
-        found = _at_value(moved, active)
+        found = _at_value(moved, active, border)
         if found is not None and found.orbit.admissible and not found.orbit.symmetric:
             return found if found.missed < _MISSED else None
     return None
 
 
-def _at_value(orbit: Orbit, active: int) -> Family | None:
+def _at_value(orbit: Orbit, active: int, border: Border) -> Family | None:
     """Return the orbit of a family next to a guess, at the value at which w F_b vanishes."""
     start = float(orbit.vector[active])
     trials: list[tuple[float, float]] = []
-    value, normal = start, None
+    value = start
     for _ in range(_TRIALS):
         vector = orbit.vector.copy()
         vector[active] = value
-        joints = _least(orbit, vector)
+        joints = _reduced(orbit, vector, border)
         if joints is None:
             return None
         residual, by_joints, by_parameters = equations_at(orbit.system, joints, vector)
-        left, _, right = np.linalg.svd(by_joints)
-        w = left[:, -1] if normal is None or left[:, -1] @ normal > 0.0 else -left[:, -1]
-        normal = w
+        w, along = _null_vectors(by_joints, border)
         rates = w @ by_parameters
         scale = float(np.linalg.norm(by_parameters[:, active]))
         trials.append((value, float(rates[active])))
@@ -192,7 +196,7 @@ def _at_value(orbit: Orbit, active: int) -> Family | None:
     if not regular or there.residual > _SOLVED or _is_flat(trials, scale):
         return None
     missed = abs(float(w @ residual))
-    return Family(there, right[-1].reshape(joints.shape), active, other, missed)
+    return Family(there, along.reshape(joints.shape), active, other, missed)
 
 
 def _secant(trials: list[tuple[float, float]], start: float) -> float:
@@ -209,61 +213,30 @@ def _is_flat(trials: list[tuple[float, float]], scale: float) -> bool:
     return abs(g1 - g0) < _FLAT * scale * abs(x1 - x0)
 
 
-def _least(orbit: Orbit, vector: FloatArray) -> FloatArray | None:
-    """Return the joints nearest to a guess at which the equations are as small as they can be."""
+def _bordered(by_joints: FloatArray, border: Border) -> FloatArray:
+    """Return the matrix [[F_z, w], [v, 0]]."""
+    w, v = border
+    return np.block([[by_joints, w[:, None]], [v[None, :], np.zeros((1, 1))]])
+
+
+def _null_vectors(by_joints: FloatArray, border: Border) -> Border:
+    """Return the left and the right null vector, from those of a matrix nearby."""
+    full = _bordered(by_joints, border)
+    last = np.append(np.zeros(len(by_joints)), 1.0)
+    left, right = (np.linalg.solve(matrix, last)[:-1] for matrix in (full.T, full))
+    return left / np.linalg.norm(left), right / np.linalg.norm(right)
+
+
+def _reduced(orbit: Orbit, vector: FloatArray, border: Border) -> FloatArray | None:
+    """Return the joints at which all equations hold but one, the part of F along w (Lyapunov, Schmidt)."""
     joints = orbit.joints
     for _ in range(_STEPS):
-        residual, by_joints, _ = equations_at(orbit.system, joints, vector)
-        if not (np.all(np.isfinite(by_joints)) and np.all(np.isfinite(residual))):
+        residual, by_joints, _ = equations_at(orbit.system, joints, vector, False)
+        full = _bordered(by_joints, border)
+        if not (np.all(np.isfinite(full)) and np.all(np.isfinite(residual))):
             return None
-        left, size, right = np.linalg.svd(by_joints)
-        change = right[:-1].T @ (left[:, :-1].T @ -residual / size[:-1])
+        change = np.linalg.solve(full, np.append(-residual, 0.0))[:-1]
         joints = joints + change.reshape(joints.shape)
+        if np.max(np.abs(change)) < np.finfo(float).eps:
+            break
     return joints
-
-
-# ------------------------------------------------------------------- a symmetric branch passes a family
-
-
-def with_families(branch: Branch, settings: Settings) -> Branch:
-    """Return a symmetric branch with the branch points at which it passes families of asymmetric orbits."""
-    mu = branch.turn_multipliers
-    if mu is None or not branch.system.half or branch.bridge or len(branch) < 3:
-        return branch
-    away = np.min(np.abs(mu + 1.0), axis=1)
-    near = (away[1:-1] < _TOUCHES) & (away[1:-1] <= away[:-2]) & (away[1:-1] < away[2:])
-    sides = np.min((mu + 1.0).real, axis=1)
-    touches = near & (sides[:-2] * sides[2:] > 0.0)
-    events = [_passed(branch, mu, int(k)) for k in 1 + np.flatnonzero(touches)]
-    found = [b for b in events if b is not None and not _is_listed(branch, b, settings)]
-    return replace(branch, bifurcations=in_order(branch, found)) if found else branch
-
-
-def _is_listed(branch: Branch, event: Bifurcation, settings: Settings) -> bool:
-    value = event.params[branch.parameter]
-    return any(
-        b.kind is event.kind
-        and abs(b.params[branch.parameter] - value) <= max(LEAST, b.accuracy) * settings.width
-        for b in branch.bifurcations
-    )
-
-
-def _passed(branch: Branch, mu: NDArray[np.complex128], k: int) -> Bifurcation | None:
-    """Return the branch point next to a point of a symmetric branch, if it passes a family there."""
-    active = branch.model.index_of(branch.parameter)
-    before, after = branch.values[k - 1], branch.values[k + 1]
-    family = family_near(branch[k], active, abs(float(after - before)))
-    if family is None:
-        return None
-    value = float(family.orbit.vector[active])
-    if not min(before, after) <= value <= max(before, after):
-        return None
-    j = k if (branch.values[k] - value) * (after - value) <= 0.0 else k - 1
-    share = (value - branch.values[j]) / (branch.values[j + 1] - branch.values[j])
-    position = float(branch.arc[j] + share * (branch.arc[j + 1] - branch.arc[j]))
-    there = refine(replace(branch.between(position), vector=family.orbit.vector), damped=False)
-    if not there.converged:
-        return None
-    low, high = (k - 1, k + 1) if before < after else (k + 1, k - 1)
-    below, above = (bool(np.all(np.abs(mu[i]) < 1.0)) for i in (low, high))
-    return Bifurcation(Kind.BP, there.params, there, (), position, below, above, bound=LEAST)

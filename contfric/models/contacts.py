@@ -177,8 +177,9 @@ def _direction(entry: Part, key: str, form: Affine, shift: int, count: int) -> d
         if weight is None:
             entry.fail(key, f"the factors of the {what} in '{key}' are numbers, not parameters")
         if not shift <= which < shift + count:
+            example = "v1 - v2" if shift else "0.1 - q1"
             entry.fail(
-                key, f"'{key}' is made of {what}, numbers, parameters and t, such as v1 - v2"
+                key, f"'{key}' is made of {what}, numbers, parameters and t, such as {example}"
             )
         found[which - shift] = weight
     if not found:

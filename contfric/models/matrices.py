@@ -1,7 +1,7 @@
 """Mass, damping and stiffness of a structure, and what follows from them.
 
 A matrix is a list of rows of expressions, a list of its diagonal, one expression (times identity), or the
-itinerary ``identity``; in a file of a model also ``{file: frame.npz, array: M}``.
+word ``identity``; in a file of a model also ``{file: frame.npz, array: M}``.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import numpy as np
 
 from contfric.errors import ModelError, did_you_mean, shown
+from contfric.models.definition import FloatArray
 from contfric.models.entries import EntryError, Part
 from contfric.models.grammar import number_of
 
@@ -52,7 +54,11 @@ def matrix_of(key: str, value: Any, size: int, default: str | None = None) -> Te
         value = value.tolist()
     if isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = ["1" if value == IDENTITY else value] * size
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != size:
+    if isinstance(value, Sequence) and not isinstance(value, str) and len(value) != size:
+        raise EntryError(
+            (key,), f"{wanted}; it has {len(value)} rows, and there are {size} coordinates"
+        )
+    if not isinstance(value, Sequence) or isinstance(value, str):
         raise EntryError((key,), f"{wanted}; got {shown(value)}")
     rows = list(value)
     if not any(isinstance(row, (list, tuple)) for row in rows):
@@ -103,10 +109,11 @@ def _from_file(part: Part, path: Path) -> Any:
         if path.suffix == ".mtx":
             from scipy.io import mmread
 
-            found = mmread(path)
-            return np.asarray(found.todense() if hasattr(found, "todense") else found)
+            return _real(part, path.name, mmread(path))
         if path.suffix != ".npz":
             part.fail("file", f"{path.name} is no npz with named arrays, and no .mtx")
+        if not is_zipfile(path):
+            part.fail("file", f"{path.name} is no npz file")
         with np.load(path, allow_pickle=False) as arrays:
             if "array" not in part.data:
                 part.fail(None, f"say which array of {path.name}: {', '.join(arrays.files)}")
@@ -114,9 +121,23 @@ def _from_file(part: Part, path: Path) -> Any:
             if name not in arrays.files:
                 hint = did_you_mean(name, arrays.files)
                 part.fail("array", f"{path.name} has no array '{name}'{hint}")
-            return np.asarray(arrays[name], dtype=np.float64)
+            return _real(part, f"'{name}' of {path.name}", arrays[name])
     except (OSError, ValueError) as error:
         part.fail("file", f"{path.name} cannot be read: {error}")
+
+
+def _real(part: Part, name: str, matrix: Any) -> FloatArray:
+    """Return what a file has as an array of real numbers."""
+    found = dense(matrix)
+    if found.dtype.kind not in "iuf" or found.ndim not in (1, 2):
+        what = f"{found.ndim} dimensions of {found.dtype.name}"
+        part.fail("file", f"{name} has {what}: a matrix has rows of real numbers")
+    return np.asarray(found, dtype=np.float64)
+
+
+def dense(matrix: Any) -> Any:
+    """Return a matrix as an array, also one that is sparse."""
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix)
 
 
 @dataclass(frozen=True)

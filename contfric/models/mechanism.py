@@ -12,6 +12,7 @@ from contfric.models.definition import Model
 from contfric.models.describe import describe
 from contfric.models.entries import EntryError
 from contfric.models.files import built
+from contfric.models.matrices import dense
 from contfric.models.structure_names import COORDINATES
 
 
@@ -32,7 +33,7 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
 
     Parameters
     ----------
-    mass, damping, stiffness : arrays of shape (n, n), or lists of expressions of the parameters
+    mass, damping, stiffness : arrays of shape (n, n), sparse ones too, or lists of expressions of parameters
     contacts : as in a model's file, such as ``{"pad": {"kind": "friction", ...}}``
     force : expression of the force on each coordinate that has one
     parameters : their defaults
@@ -53,14 +54,15 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
     ...              parameters={"Omega": 0.5, "S": 0.3, "S0": 0.4}, period="2*pi/Omega").states
     ('q1', 'v1')
     """
+    mass, damping, stiffness = (_rows(matrix) for matrix in (mass, damping, stiffness))
     size = len(stiffness) if coordinates is None else len(coordinates)
     data: dict[str, Any] = {
         "name": name,
         COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
         "parameters": dict(parameters or {}),
-        "mass": _rows(mass),
-        "damping": _rows(damping),
-        "stiffness": _rows(stiffness),
+        "mass": mass,
+        "damping": damping,
+        "stiffness": stiffness,
         "force": dict(force or {}),
         "contacts": {key: dict(entry) for key, entry in contacts.items()},
         **({"period": period} if period else {"autonomous": True}),
@@ -74,4 +76,5 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
 
 
 def _rows(matrix: Any) -> Any:
-    return matrix.tolist() if isinstance(matrix, np.ndarray) else matrix
+    is_array = isinstance(matrix, np.ndarray) or hasattr(matrix, "toarray")
+    return dense(matrix).tolist() if is_array else matrix

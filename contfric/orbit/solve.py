@@ -15,6 +15,7 @@ from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.sections import has_sections, named_by_ends
 from contfric.orbit.simulation import Trajectory, run
 from contfric.orbit.starts import start_of
 from contfric.orbit.system import System, build_system
@@ -194,19 +195,21 @@ def stretches(
     trajectory: Trajectory, system: System, period: float
 ) -> Iterator[tuple[float, FloatArray]]:
     """Yield (mismatch, joints) for each place where a trajectory walks the system's itinerary."""
-    itinerary, count = trajectory.itinerary, system.segments
+    model, count = system.model, system.segments
+    itinerary = named_by_ends(trajectory.itinerary, model)
     clock = trajectory.times + trajectory.cycles * period
     points = np.column_stack([clock, trajectory.states])
+    if not has_sections(model, system.itinerary):  # it passes them without joints
+        kept = [i for i, pair in enumerate(itinerary) if pair not in model.sections]
+        itinerary, points = tuple(itinerary[i] for i in kept), points[kept]
     closure, turn = system.layout.closure, system.layout.turn * period
     for i in range(1, len(itinerary) - count + 1):
         if itinerary[i : i + count] != system.itinerary:
             continue
-        joints = clocked(
-            system.model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0]
-        )
+        joints = clocked(model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0])
         gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T
         slip = 0.0
-        if not system.model.autonomous:
+        if not model.autonomous:
             slip = points[i - 1 + count, 0] - joints[0, 0] - turn
             joints[:, 0] -= np.floor(joints[0, 0] / period) * period
         yield float(np.max(np.abs(gap)) + abs(slip)), joints

@@ -220,3 +220,38 @@ def test_a_tangential_stop_is_a_graze_whatever_else_sticks() -> None:
     time, state = float(end.orbit.ends[i, 0]), end.orbit.ends[i, 1:]
     assert end.orbit.flow.observe(observable, time, state) == pytest.approx(0.0, abs=1e-10)
     assert abs(end.orbit.flow.rate(mode, observable, time, state)) < 1e-6
+
+
+def test_a_slip_that_vanishes_is_one_event_to_its_end() -> None:
+    """Near it multipliers are rounding over the product of two rates: their changes of sign are no events."""
+    rng = np.random.default_rng(2)
+    n = 20
+    between = np.diag(rng.uniform(0.3, 0.7, n - 1), 1)
+    between = between + between.T
+    stiffness = np.diag(rng.uniform(0.8, 1.2, n) + between.sum(axis=1)) - between
+    mass = np.diag(rng.uniform(0.8, 1.2, n))
+    where = np.sort(rng.choice(np.arange(1, n + 1), 10, replace=False))
+    rubs: dict[str, dict[str, Any]] = {
+        f"b{i}": {
+            "kind": "friction",
+            "velocity": f"v{k}",
+            "kinetic": f"{rng.uniform(0.5, 1.5):.4f}*S",
+        }
+        for i, k in enumerate(where)
+    }
+    model = cf.Mechanism(
+        mass,
+        0.02 * stiffness,
+        stiffness,
+        contacts=rubs,
+        force={"q1": "cos(Omega*t)"},
+        parameters={"Omega": 0.95636, "S": 0.03},
+        period="2*pi/Omega",
+        name="slip-vanishes",
+    )
+    branch = cf.continue_orbit(cf.find_orbit(model, periods=1), "Omega", (0.9563, 0.95637))
+    (event,) = (b for b in branch.bifurcations if b.kind is not cf.Kind.T)
+    assert event.kind.value in ("AS", "SS")
+    assert abs(event.params["Omega"] - 0.95633425311519) < 1e-11
+    orbit = event.orbit
+    assert np.min(orbit.ends[:, 0] - orbit.cycle[:, 0]) < 1e-5 * orbit.period

@@ -9,6 +9,7 @@ import contfric as cf
 from contfric.models.evaluate import floats
 from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.simulation import Trajectory
+from contfric.signature import canonical_itinerary
 
 PARAMETERS = {"Omega": 0.9, "k": 1.0, "S1": 0.3, "S2": 1.5}
 FREE = {"c1": {"kind": "friction", "velocity": "v1", "kinetic": "S1"}}
@@ -170,3 +171,17 @@ def test_a_random_stuck_branch_off_the_centre_has_no_loose_end(seed: int) -> Non
     assert "SHAKEDOWN" in {end.reason.name for branch in diagram.branches for end in branch.ends}
     assert not diagram.loose_ends
     assert diagram.verify(restarts=1).passed
+
+
+@pytest.mark.parametrize("force", [0.25, 0.4, 1.2])
+def test_an_orbit_is_solved_by_its_own_signature(force: float) -> None:
+    """The simulation meets sections, on which an orbit has no joints; where an element rests is left free."""
+    found = cf.find_orbit("iwan", {"F": force})
+    solved = cf.solve_orbit("iwan", found.signature, found.params)
+    assert solved.admissible and solved.residual < 1e-10
+    own = [
+        canonical_itinerary(orbit.as_whole().itinerary, found.model) for orbit in (solved, found)
+    ]
+    assert own[0] == own[1]
+    if force > 1.0:  # all elements slip
+        assert abs(solved.x_max - found.x_max) < 1e-11

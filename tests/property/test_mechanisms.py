@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import mmwrite
+from scipy.sparse import csr_matrix
 
 import contfric as cf
 from contfric.errors import ModelError
@@ -211,7 +214,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"mass": [[1.0, 0.0], [0.0, 0.0]]}, "leave out coordinates without mass"),
     ({"mass": [["m", 0.1], [0.1, 1.0]]}, "parameters cannot stand in it"),
     ({"mass": [1.0, 2.0, 3.0]}, "'mass' is a matrix of 2 rows of 2"),
+    ({"mass": [1.0, 2.0, 3.0]}, "it has 3 rows, and there are 2 coordinates"),
     ({"stiffness": [[1.0, "k"], [0.0]]}, "row 2 is"),
+    ({"stiffness": np.eye(2) * (1.0 + 1.0j)}, "stiffness -> 0: an entry of 'stiffness'"),
+    ({"contacts": {"a": WALL | {"gap": "1 - v1"}}}, "made of coordinates, .* such as 0.1 - q1"),
     ({"force": {"q3": "1"}}, "unknown key 'q3'"),
     ({"contacts": {"a": {"kind": "glue", "velocity": "v1"}}}, "no kind of contact 'glue'"),
     (
@@ -509,3 +515,53 @@ def test_a_sweep_of_a_structure_needs_no_section() -> None:
     orbit = cf.find_orbit(model, {"w": 0.9})
     assert found.up.states[-1] == pytest.approx(orbit.as_whole().state(0.0), abs=1e-8)
     assert cf.poincare(model, state=[0.1, 0.0, 0.0, 0.0], periods=3).section == 0.0
+
+
+FROM_FILE = """
+name: from-file
+coordinates: [q1, q2]
+parameters: {S: 0.2}
+period: 2*pi
+mass: identity
+damping: 0.05
+stiffness: {file: FILE, array: K}
+force: {q1: cos(t)}
+contacts:
+  pad: {kind: friction, velocity: v1, kinetic: S}
+"""
+
+
+@pytest.mark.parametrize(
+    ("array", "message"),
+    [
+        (np.eye(2) * (1.0 + 1.0j), "'K' of given.npz has 2 dimensions of complex128"),
+        (np.zeros((2, 2, 2)), "has 3 dimensions of float64"),
+        (np.array([["1", "k"], ["k", "1"]]), "a matrix has rows of real numbers"),
+        (np.eye(3), "it has 3 rows, and there are 2 coordinates"),
+        (None, "given.npz is no npz file"),
+    ],
+)
+def test_what_a_file_has_is_a_matrix_of_real_numbers(
+    array: np.ndarray | None, message: str, tmp_path: Path
+) -> None:
+    """An imaginary part (hysteretic damping) is not left out without a word."""
+    written = tmp_path / "given.npz"
+    if array is None:
+        written.write_text("1 0 0 1")
+    else:
+        np.savez(written, K=array)
+    file = tmp_path / "model.yaml"
+    file.write_text(FROM_FILE.replace("FILE", "given.npz"))
+    with pytest.raises(ModelError, match=message):
+        cf.load_model(file)
+
+
+def test_sparse_matrices_are_matrices(tmp_path: Path) -> None:
+    stiffness = [[2.0, -1.0], [-1.0, 2.0]]
+    mmwrite(tmp_path / "K.mtx", csr_matrix(stiffness))
+    file = tmp_path / "model.yaml"
+    file.write_text(FROM_FILE.replace("FILE, array: K", "K.mtx"))
+    own = {"contacts": {"pad": RUBS}, "force": {"q1": "cos(t)"}, "parameters": {"S": 0.2}}
+    typed = cf.Mechanism(np.eye(2), [0.05, 0.05], csr_matrix(stiffness), period="2*pi", **own)
+    orbits = [cf.find_orbit(model) for model in (typed, cf.load_model(file))]
+    assert np.max(np.abs(orbits[0].joints - orbits[1].joints)) < 1e-12
