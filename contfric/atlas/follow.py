@@ -55,6 +55,8 @@ _NOWHERE_ROUGHLY = 1e-3
 #: A bridge shorter than this violates a condition by its square from the start on, which is rounding up to
 #: there (1e-10 at a slack of 1e-9 over a rate that is small).
 _ROUNDED = 1e-5
+#: A first point that violates a condition by more than this is outside: rounding is a tenth of it.
+_OUTSIDE = 1e-11
 #: Where rounding moves an event by this share of the range its orbits hold for every value of the parameter.
 _UNKNOWN = 0.1
 
@@ -234,14 +236,17 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     """Return a branch from an event that is known roughly, with its own end there where that is known better.
 
     Where the equations of the branch that arrives are singular at its end, those of another one need not be.
-    From a place off by the root of rounding that one would begin outside of its conditions.
+    From a place off by the root of rounding that one begins outside of its conditions: that is seen of it
+    however well the event seems to be known.
     """
     known = event.bifurcation.accuracy
-    if known <= ACCURACY or branch.bridge or branch.arc[-1] < _NOWHERE_ROUGHLY:
+    outside = branch[0].margins.min(initial=0.0) < -_OUTSIDE
+    if not (known > ACCURACY or outside) or branch.bridge or branch.arc[-1] < _NOWHERE_ROUGHLY:
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
     ends = [end for end in whole.ends if meets(end, event, state.settings)]
-    better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= ACCURACY]
+    least = min(known, ACCURACY)
+    better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= least]
     return (whole, better[:1]) if better and not fault_of(whole) else (branch, [])
 
 
