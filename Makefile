@@ -137,6 +137,7 @@ stress: $(STAMP)
 	@$(BIN)/python benchmarks/stress/events.py --count 400 --seed 2 --out $(STRESS)/events.json
 	@$(BIN)/python benchmarks/stress/continuation.py --count 300 --seed 2 --out $(STRESS)/continuation.json
 	@$(BIN)/python benchmarks/stress/restarts.py --count 3000 --seed 1 --workers $(WORKERS) --out $(STRESS)/restarts.json
+	@$(BIN)/python benchmarks/stress/models.py --count 300 --seed 8 --workers $(WORKERS) --out $(STRESS)/models.json
 	@$(BIN)/python benchmarks/stress/write_page.py $(STRESS)/*.json --out docs/stress.md
 
 # A study that does not end within the limit, or ends with an error, fails this.

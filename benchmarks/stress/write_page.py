@@ -16,7 +16,7 @@ import contfric as cf
 INTRODUCTION = """# Stress runs
 
 A stress run tries many random cases and compares each with a second computation. There are far more cases
-than `make test` has time for. This page has the results of six runs: how much was tried, how large the
+than `make test` has time for. This page has the results of seven runs: how much was tried, how large the
 errors are, and which cases failed.
 
 **What is compared.** The second computation uses 50 digits. It shares nothing with contfric but the
@@ -79,9 +79,14 @@ EXPLANATIONS = {
         "branches, and must have the same branches and events. *Indices* are numbers of orbits, "
         "counted with a sign, that must be the same on both sides of an event."
     ),
+    "models": (
+        "The same for other models: those that the bundled studies explore, and those of the tests. "
+        "Parameters are moved by up to a fifth, and a random part of the range is explored, in at most a "
+        "minute. Where a study has no attractor at the moved parameters there is *no start*."
+    ),
 }
 #: Order of the sections; others follow by name.
-ORDER = ("sequences", "segments", "orbits", "events", "continuation", "restarts")
+ORDER = ("sequences", "segments", "orbits", "events", "continuation", "restarts", "models")
 
 
 def page(reports: list[Report]) -> str:

@@ -107,7 +107,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
         for candidate in in_order(proposed) if composes(orbit) else proposed:
-            jumps = jumps or candidate.has_hold
+            jumps = jumps or (candidate.has_hold and not orbit.model.filippov)
             accepted = _judge(state, event, candidate) or accepted
             if (
                 event.bifurcation.orbit is not orbit

@@ -185,3 +185,26 @@ def test_an_orbit_is_solved_by_its_own_signature(force: float) -> None:
     assert own[0] == own[1]
     if force > 1.0:  # all elements slip
         assert abs(solved.x_max - found.x_max) < 1e-11
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_sliders_begin_to_slip_the_stuck_branch_is_found_from_the_slipping_one(
+    seed: int,
+) -> None:
+    """Two sliders reach both limits at once by a touch; nothing can be held: the flow says what follows."""
+    draw = np.random.default_rng([36, seed])
+    about = {
+        "W": 1.0836,
+        "k": 0.9129,
+        "c": 0.043,
+        "kt": 0.4199,
+        "S": 0.05507,
+        "n": 1.93,
+        "m": 4.627,
+    }
+    params = {name: value * draw.uniform(0.99, 1.01) for name, value in about.items()}
+    orbit = cf.find_orbit("iwan", params | {"F": 0.16}, state=[0.05, 0, 0.05, 0.05, 0.05])
+    diagram = cf.explore(orbit, "F", (0.09, 0.17), max_periods=1)
+    assert len([b for b in diagram.branches if not b.mirrored]) == 2
+    assert not diagram.loose_ends
+    assert diagram.verify(restarts=2).faults == ()
