@@ -17,7 +17,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of
+from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of, time_unit
 from contfric.orbit.system import Itinerary, build_system, mirror_mode
 
 
@@ -198,7 +198,8 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
         gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * period) % period - 0.5 * period)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     cuts = []
-    for j, fits in enumerate((gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION)):
+    lasting = lasts > SAME_MOTION * time_unit(orbit)
+    for j, fits in enumerate((gaps.max(axis=2) < SAME_MOTION) & lasting):
         mode = mirror_mode(unit.model)[unit.mode] if unit.half and j % 2 else unit.mode
         found = [i for i in np.flatnonzero(fits) if whole(orbit.itinerary[i][0]) == whole(mode)]
         if not found:
