@@ -38,7 +38,7 @@ from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.touching import chosen_at, entered_at
+from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -339,7 +339,7 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     """GS at a reset: an impact of speed zero comes in, or goes."""
     itinerary, i = orbit.itinerary, place.segment
     mode, exit_ = itinerary[i]
-    if not orbit.model.reset_by_surface[place.surface].stays:
+    if thrown_at(orbit, place):
         raise NotationError(
             f"behind the reset at {place.surface} motion starts somewhere else: no orbit is near"
         )
