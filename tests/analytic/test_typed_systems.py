@@ -52,6 +52,42 @@ modes:
 """
 
 
+RUNNER = """
+name: runner
+states: [x, y, vx, vy]
+parameters: {k: 20.0, al: 1.05, g: 1.0}
+autonomous: true
+define: {r: sqrt(x**2 + y**2)}
+surfaces:
+  apex: {observable: vy}
+  down: {observable: y, level: sin(al)}
+  up: {observable: r, level: 1}
+modes:
+  rise: {in: {apex: +}, field: {x: vx, y: vy, vx: 0, vy: -g}}
+  fall: {in: {apex: -, down: +}, field: {x: vx, y: vy, vx: 0, vy: -g}}
+  stance: {in: {up: -}, field: {x: vx, y: vy, vx: k*(1 - r)*x/r, vy: k*(1 - r)*y/r - g}}
+resets:
+  apex: {to: fall, from: [rise]}
+  down: {x: -cos(al), to: stance, from: [fall]}
+  up: {to: rise, from: [stance]}
+"""
+
+#: A predator that is culled above a threshold: prey and predator come to rest on it.
+THRESHOLD = """
+name: harvest
+states: [x, y]
+parameters: {r: 1.0, K: 3.0, a: 1.5, m: 0.5, mu: 0.6, E: 0.4, Tc: 0.8}
+autonomous: true
+define: {eat: a*x*y/(1 + x)}
+surfaces:
+  threshold: {observable: y, level: Tc, sliding: filippov}
+modes:
+  free: {in: {threshold: -}, field: {x: r*x*(1 - x/K) - eat, y: mu*eat - m*y}}
+  cull: {in: {threshold: +}, field: {x: r*x*(1 - x/K) - eat, y: mu*eat - m*y - E*y}}
+spread: {x: 3, y: 2}
+"""
+
+
 def typed(folder, text: str) -> cf.Model:
     """Return a model from the text of its file."""
     path = folder / "model.yaml"
@@ -140,3 +176,40 @@ def test_the_period_of_an_excitation_keeps_its_name(tmp_path) -> None:
     text = OCEAN.replace("autonomous: true", "period: 2*pi")
     with pytest.raises(cf.ModelError, match="the period of the excitation"):
         typed(tmp_path, text)
+
+
+def test_a_runner_on_a_spring(tmp_path) -> None:
+    """SLIP, touching down at a fixed angle: the map from apex to apex keeps energy and has one slope."""
+    orbit = cf.find_orbit(typed(tmp_path, RUNNER), state=[0.0, 1.02, 2.0, 0.0])
+    assert [mode for mode, _ in orbit.itinerary] == ["fall", "stance", "rise"]
+
+    def next_apex(height: float, energy: float) -> float:
+        speed, al = math.sqrt(2.0 * (energy - height)), 1.05
+        start = [-math.cos(al), math.sin(al), speed, -math.sqrt(2.0 * (height - math.sin(al)))]
+
+        def stance(_, y):
+            r = math.hypot(y[0], y[1])
+            pull = 20.0 * (1.0 - r) / r
+            return y[2], y[3], pull * y[0], pull * y[1] - 1.0
+
+        def lift(_, y):
+            return math.hypot(y[0], y[1]) - 1.0
+
+        lift.terminal, lift.direction = True, 1
+        run = solve_ivp(stance, (0, 5), start, method="DOP853", events=lift, rtol=1e-12, atol=1e-13)
+        return float(run.y[1, -1] + run.y[3, -1] ** 2 / 2.0)
+
+    places = dict(zip((exit_ for _, exit_ in orbit.itinerary), orbit.ends, strict=True))
+    _, _, height, speed, _ = places["apex"]
+    energy = height + speed**2 / 2.0
+    assert next_apex(height, energy) == pytest.approx(height, abs=1e-9)
+    step = 1e-5
+    slope = (next_apex(height + step, energy) - next_apex(height - step, energy)) / (2.0 * step)
+    multipliers = sorted(orbit.multipliers, key=abs)
+    assert multipliers[-1].real == pytest.approx(1.0, abs=1e-9)
+    assert multipliers[-2].real == pytest.approx(slope, abs=1e-6)
+
+
+def test_what_slides_for_ever_is_called_by_its_mode(tmp_path) -> None:
+    with pytest.raises(cf.ConvergenceError, match="stays in mode 'slide' for ever"):
+        cf.find_orbit(typed(tmp_path, THRESHOLD), state=[1.0, 0.5])
