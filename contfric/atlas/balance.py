@@ -135,7 +135,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
                 below += _rests(rest, diagram.parameter, value - beside)
                 above += _rests(rest, diagram.parameter, value + beside)
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
-            if any(leads_elsewhere(e.orbit.system, test) for e in events for test in e.tests):
+            if any(leads_elsewhere(e.orbit, test) for e in events for test in e.tests):
                 below = above = None
             if _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
                 below = above = None  # beyond it orbits have another offset, each of a continuum

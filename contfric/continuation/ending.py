@@ -10,7 +10,7 @@ from contfric.continuation.outcomes import NoJump, outcome_at
 from contfric.continuation.places import places_of
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.touching import entered_at
+from contfric.continuation.touching import entered_at, thrown_at
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import NotationError
@@ -190,9 +190,9 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         struck = next(
             t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
         )
-        if orbit.model.reset_by_surface[struck].stays:
-            return "grazing impact: the wall is just touched"
-        return f"grazing: the surface of the reset at '{struck}' is just touched"
+        if thrown_at(orbit, next(t for t in bifurcation.tests if t.surface == struck)):
+            return bifurcation.meaning
+        return "grazing impact: the wall is just touched"
     if any(entered_at(orbit.system, test) for test in bifurcation.tests):
         return bifurcation.meaning
     if {test.surface for test in bifurcation.tests} & orbit.model.settled_sides.keys():

@@ -16,6 +16,7 @@ from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import (
     chosen_at,
     entered_at,
+    thrown_at,
 )
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
@@ -262,6 +263,11 @@ class Bifurcation(MeasuredEvent):
         entered = filter(None, (entered_at(self.orbit.system, test) for test in self.tests))
         if mode := next(entered, ""):
             return f"grazing: motion that crosses stays in '{mode}', and the map jumps"
+        thrown = filter(None, (thrown_at(self.orbit, test) for test in self.tests))
+        if surface := next(thrown, ""):
+            return (
+                f"grazing: the reset at '{surface}' takes motion somewhere else, and the map jumps"
+            )
         return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:

@@ -34,7 +34,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
-from contfric.orbit.slides import SAME_MOTION, SHORT, resting_modes
+from contfric.orbit.slides import SAME_MOTION, SHORT, resting_modes, time_unit
 from contfric.orbit.system import Itinerary, Margin, Test, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -121,7 +121,7 @@ def _moves(orbit: Orbit) -> bool:
     resting = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     for (mode, _), begin, last in zip(orbit.itinerary, orbit.begins, lasts, strict=True):
-        if mode not in resting and last > SHORT:
+        if mode not in resting and last > SHORT * time_unit(orbit):
             start = float(begin[0]), begin[1:]
             moved = [orbit.flow.state(mode, *start, float(last * share)) for share in _SHARES]
             if np.max(np.abs(np.array(moved) - begin[1:])) > SAME_MOTION:
@@ -232,7 +232,7 @@ def _vanished(orbit: Orbit) -> Iterator[Test]:
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     for hold in orbit.system.holds:
         touches = hold.pin is None and not hold.after_rest
-        if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH:
+        if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH * time_unit(orbit):
             yield Test(Margin.EXIT, hold.segment, hold.leaves)
 
 

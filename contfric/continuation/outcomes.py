@@ -38,7 +38,7 @@ from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.touching import chosen_at, entered_at
+from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -48,6 +48,7 @@ from contfric.continuation.zero_acceleration import (
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import time_unit
 from contfric.orbit.starts import signs_at
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
@@ -273,7 +274,7 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
     after_rest = ends_rest(orbit.model, *itinerary[before])
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
-    if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length:
+    if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length * time_unit(orbit):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
             fused = Edit(frozenset({h, behind}), {before % len(itinerary): itinerary[behind][1]})
@@ -286,7 +287,8 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
         return _never_left(orbit, h, after_rest)
     if place.margin is Margin.INTERIOR:
         return _pin_moves(orbit, place, after_rest)
-    gone = orbit.ends[behind, 0] - orbit.cycle[behind, 0] < NEARLY_NO_LENGTH
+    lasts = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
+    gone = lasts < NEARLY_NO_LENGTH * time_unit(orbit)
     if (
         gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH
     ):  # a second hold, and the slide between them
@@ -345,7 +347,7 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     """GS at a reset: an impact of speed zero comes in, or goes."""
     itinerary, i = orbit.itinerary, place.segment
     mode, exit_ = itinerary[i]
-    if not orbit.model.reset_by_surface[place.surface].stays:
+    if thrown_at(orbit, place):
         raise NotationError(
             f"behind the reset at {place.surface} motion starts somewhere else: no orbit is near"
         )

@@ -7,6 +7,8 @@ from functools import cache
 
 import numpy as np
 
+from contfric.continuation.zero_acceleration import touch_of
+from contfric.errors import NotationError
 from contfric.models.definition import Domain, Model
 from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
@@ -148,12 +150,30 @@ def entered_at(system: System, test: Test) -> str:
     return ""
 
 
-def leads_elsewhere(system: System, test: Test) -> bool:
+def thrown_at(orbit: Orbit, test: Test) -> str:
+    """Return the surface of a reset that takes what just touches it somewhere else; else nothing.
+
+    An impact changes nothing at a touch, as ``v -> -e v`` at v = 0. A reset off its surface does, and so does
+    one along it (a neuron that fires begins at x = 0, whatever x was).
+    """
+    reset = orbit.model.reset_by_surface.get(test.surface)
+    if reset is None or reset.wraps or test.margin not in (Margin.INTERIOR, Margin.EXIT):
+        return ""
+    try:
+        inside = test.margin is Margin.INTERIOR
+        touch = touch_of(orbit, test.segment, test.surface) if inside else orbit.ends[test.segment]
+    except NotationError:  # nothing is touched inside
+        return "" if reset.stays else test.surface
+    image = orbit.flow.reset(test.surface, float(touch[0]), touch[1:])
+    moved = np.max(np.abs(image - touch[1:]))
+    return test.surface if moved > _PASSED * (1.0 + np.max(np.abs(touch[1:]))) else ""
+
+
+def leads_elsewhere(orbit: Orbit, test: Test) -> bool:
     """Tell whether nothing lies between the motions on both sides of an event.
 
-    So it is where a reset off its surface is touched, where a reset chooses another mode, and where a touch
-    leads into a mode that overlaps.
+    So it is where a reset takes what touches it somewhere else, where a reset chooses another mode, and where
+    a touch leads into a mode that overlaps.
     """
-    reset = system.model.reset_by_surface.get(test.surface)
-    touched = reset is not None and not reset.stays
-    return touched or bool(chosen_at(system, test) or entered_at(system, test))
+    chosen = chosen_at(orbit.system, test) or entered_at(orbit.system, test)
+    return bool(chosen or thrown_at(orbit, test))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from contfric.models.definition import Domain, Surface
@@ -21,11 +22,13 @@ def departing_side(
 ) -> int:
     """Return the side that motion on a surface leaves to in a region, 0 if that is not clear.
 
+    If one mode holds on both sides motion goes on in it, whichever side it leaves to: most states tell.
+
     Parameters
     ----------
     beside : the mode on each side, by +1 and -1
     """
-    verdicts = set()
+    verdicts = Counter[int]()
     # 12 states: what a single one says may be an accident of the region's edge
     for t, y in sampler.on(surface, sides, 12):
         away = [
@@ -33,8 +36,10 @@ def departing_side(
             for side, mode in beside.items()
             if side * sampler.rate(mode, surface, side, t, y) > 0.0
         ]
-        verdicts.add(away[0] if len(away) == 1 else 0)
-    return verdicts.pop() if len(verdicts) == 1 else 0
+        verdicts[away[0] if len(away) == 1 else 0] += 1
+    if len(beside) == 2 and len(set(beside.values())) == 1 and (verdicts[1] or verdicts[-1]):
+        return max((1, -1), key=verdicts.__getitem__)
+    return next(iter(verdicts)) if len(verdicts) == 1 else 0
 
 
 def turned_modes(

@@ -332,7 +332,7 @@ def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...]
     zero = dict.fromkeys(states, 0.0)
 
     def value(name: str, state: Mapping[str, float], t: float, period: float) -> float:
-        scope = Scope(FLOATS, {**state, TIME: t, PERIOD: period})
+        scope = Scope(FLOATS, {PERIOD: period, **state, TIME: t})
         return scope.evaluate(parse(images[name]))
 
     rows = []

@@ -103,8 +103,9 @@ class Evaluator(Generic[T]):
         """Return time and state under the declared symmetry."""
         images = self.description.symmetry or {}
         states = self.description.states
-        found = [self.value(images.get(s, s), params, t, y, **{PERIOD: period}) for s in states]
-        return self.value(images.get(TIME, TIME), params, t, y, **{PERIOD: period}), found
+        lasts = {} if PERIOD in states else {PERIOD: period}
+        found = [self.value(images.get(s, s), params, t, y, **lasts) for s in states]
+        return self.value(images.get(TIME, TIME), params, t, y, **lasts), found
 
 
 def floats(description: Description) -> Evaluator[float]:

@@ -7,7 +7,7 @@ keeps h (A. F. Filippov, Differential Equations with Discontinuous Righthand Sid
     f = (r- f+ - r+ f-) / (r- - r+)
 
 Where ``r- - r+`` is never positive nothing slides: motion passes the surface, or leaves it on both sides, and
-no mode is added.
+no mode is added. Where it depends on parameters only, their defaults tell.
 
 Where two surfaces cross, see :mod:`contfric.models.crossing`.
 
@@ -192,7 +192,14 @@ class _Sliding:
         on = _known_on(formulas, own, formulas.observables()[c])
         self.rate_up, self.rate_down = (rates[k][c].subs(on) for k in (up, down))
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
-        self.somewhere = not self.apart.is_nonpositive
+        self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
+        known = dict(zip(formulas.y, description.states, strict=True))
+        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
+        self.named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
+        largest = self.apart
+        if self.constant:
+            largest = largest.xreplace(self.named).subs(defaults(description))
+        self.somewhere = not largest.is_nonpositive
         if not self.somewhere:
             return
         pair = zip(fields[up], fields[down], strict=True)
@@ -203,10 +210,6 @@ class _Sliding:
             for a, b in ((a.subs(on), b.subs(on)) for a, b in pair)
         ]
         self.states = description.states
-        known = dict(zip(formulas.y, description.states, strict=True))
-        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
-        self.named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
-        self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
 
     def text(self, formula: Any) -> str:
         """Return a formula as an expression of the model."""

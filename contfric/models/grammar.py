@@ -34,7 +34,7 @@ TIME, PERIOD, PI = "t", "T", "pi"
 RESERVED = (TIME, PERIOD, PI, *FUNCTIONS)
 _MEANINGS = {
     TIME: "the time",
-    PERIOD: "the period of the excitation (it is a parameter only where 'period: T')",
+    PERIOD: "the period of the excitation (but for a parameter where 'period: T', and in autonomous models)",
     PI: "the number pi",
 }
 

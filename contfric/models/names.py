@@ -48,7 +48,8 @@ class Names:
     def check_names(self, period: str) -> None:
         """Refuse names that expressions cannot use, or that mean two things.
 
-        A parameter T is welcome where it is the period, whatever unit of time that is counted in.
+        A parameter T is welcome where it is the period, whatever unit of time that is counted in; and
+        anything may be called T, such as a temperature, where there is no excitation.
         """
         own_period = _IS_T.fullmatch(period) is not None
         taken: dict[str, str] = {}
@@ -62,7 +63,8 @@ class Names:
             for index, name in enumerate(names):
                 address: Address = (key, index if key == "states" else name)
                 try:
-                    if not (name == PERIOD and what == "parameter" and own_period):
+                    parameter = what == "parameter" and own_period
+                    if not (name == PERIOD and (parameter or not period)):
                         check_name(name, what)
                 except ModelError as error:
                     raise EntryError(address, str(error)) from None
@@ -98,13 +100,14 @@ class Names:
                 "t stands in an expression of an autonomous model: give the 'period' of the "
                 "excitation in place of 'autonomous'",
             )
-        if PERIOD in found and PERIOD not in self.parameters:
+        if PERIOD in found and PERIOD not in (*self.states, *self.parameters):
             raise EntryError(address, "the period T can only stand in the symmetry")
 
     def leaves(self, tree: ast.expr, above: tuple[str, ...]) -> set[str]:
         """Return the states, parameters and t that an expression depends on."""
         found: set[str] = set()
-        known = (*self.states, *self.parameters, TIME, PERIOD, PI)
+        known = (*self.states, *self.parameters, TIME, PI)
+        known = known if PERIOD in self.parts else (*known, PERIOD)
         for name in names_in(tree):
             if name in known:
                 found.add(name)

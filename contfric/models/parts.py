@@ -106,7 +106,8 @@ class Lead:
 def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Domain]:
     """Return the domains behind a reset: of modes that overlap there the first that it leads into.
 
-    Where it leads into none of them, the mode before it goes on.
+    A mode that it names is preferred to sliding on a surface next to it. Where it leads into none of them,
+    the mode before it goes on.
     """
     found = list(behind)
     for lead in (*leads, Lead(before, {})):
@@ -117,8 +118,19 @@ def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Do
             for d in found
             if d.own_mode == lead.mode and all(d.signs[s] == v for s, v in lead.where.items())
         ]
-        found = [d for d in found if d.own_mode == lead.mode or d.signs not in kept]
+        beside = kept if lead.mode != before else []
+        found = [
+            d
+            for d in found
+            if d.own_mode == lead.mode
+            or not (d.signs in kept or any(_is_next_to(d.signs, signs) for signs in beside))
+        ]
     return found
+
+
+def _is_next_to(sliding: Mapping[str, int], signs: Mapping[str, int]) -> bool:
+    """Return whether a region lies next to what slides on one of its surfaces."""
+    return all(side in (0, signs[surface]) for surface, side in sliding.items())
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
             modes[mode] = entry
             continue
         other = f"{mode}-"
-        while other in data["modes"]:
+        while other in data["modes"] or other in modes:
             other += "-"
         parts[mode] = mode, other
         for part, side in (mode, "+"), (other, "-"):

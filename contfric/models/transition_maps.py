@@ -210,7 +210,7 @@ class TransitionMaps(SectionMaps):
         landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
         asked = {**fixed, **landed}
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
-        behind = [*behind, *self._departed(asked)]
+        behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
         behind = led(behind, reset.leads, domain.own_mode)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
@@ -231,6 +231,20 @@ class TransitionMaps(SectionMaps):
             wanted = {**departure.where, **leaves}
             found += [d for d in self.domains if all(d.signs[s] == v for s, v in wanted.items())]
         return found
+
+    def _led_away(self, asked: Mapping[str, int], reset: Reset, before: Domain) -> list[Domain]:
+        """Return the domains of modes that a reset names next to surfaces that motion slid on before."""
+        slid = {s for s, side in asked.items() if side == 0}
+        named = {
+            lead.mode for lead in reset.leads if not lead.after or before.own_mode in lead.after
+        }
+        return [
+            d
+            for d in self.domains
+            if slid
+            and d.own_mode in named
+            and all(d.signs[s] == side or (s in slid and d.signs[s]) for s, side in asked.items())
+        ]
 
     @cached_property
     def chatter_at(self) -> dict[tuple[str, str], Chatter]:

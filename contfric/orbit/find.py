@@ -183,8 +183,11 @@ def _check_motion(trajectory: Trajectory) -> None:
     if trajectory.end is SimulationEnd.QUIET and (why := goes_on(trajectory)):
         raise ConvergenceError(f"no periodic orbit: {why}", trajectory)
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
+        why, mode = trajectory.end.value, trajectory.last[3]
+        if trajectory.end is SimulationEnd.HELD and mode:
+            why = f"the motion stays in mode '{mode}' for ever: nothing releases it"
         raise ConvergenceError(
-            f"no periodic orbit: {trajectory.end.value}. Choose other parameters or another start",
+            f"no periodic orbit: {why}. Choose other parameters or another start",
             trajectory,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -91,18 +91,16 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     if (
         mode in model.chatter_by_mode
     ):  # at rest on a wall no side of a section is told: look a little ahead
-        begin, lasts = orbit.begins[i], orbit.ends[i][0] - orbit.begins[i][0]
-        state = model.view(orbit.vector).state(
-            itinerary[i][0], float(begin[0]), begin[1:].copy(), _AHEAD * lasts
-        )
-        signs = _signs_at(orbit, float(begin[0] + _AHEAD * lasts), state)
-        return _nearest(
-            [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])], signs
-        )
+        own = [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])]
+        return _nearest(own, _signs_ahead(orbit, i, model.surface_by_name))
     if entry not in model.reset_by_surface and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
     signs = _signs_at(orbit, float(begin[0]), begin[1:].copy())
+    if entry in model.reset_by_surface:
+        before, reset = model.domain_by_name[ends[i - 1]].signs, model.reset_by_surface[entry]
+        slid = [s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)]
+        signs |= _signs_ahead(orbit, i, slid)
     if is_hold(entry):
         after = [model.domain_by_name[d] for d in domains_after(model, mode, itinerary[i][0])]
         return _nearest(after, signs)
@@ -114,6 +112,18 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     )  # a surface met at the impact is on either side
     own = [d for d in own if d.name in led] or own
     return _nearest(own, signs)
+
+
+def _signs_ahead(orbit: Orbit, i: int, surfaces: Collection[str]) -> dict[str, int]:
+    """Return the sides of surfaces soon after segment i begins on them."""
+    if not surfaces:
+        return {}
+    begin = orbit.begins[i]
+    ahead = _AHEAD * float(orbit.ends[i][0] - begin[0])
+    mode, view = orbit.itinerary[i][0], orbit.model.view(orbit.vector)
+    state = view.state(mode, float(begin[0]), begin[1:].copy(), ahead)
+    signs = _signs_at(orbit, float(begin[0] + ahead), state)
+    return {surface: signs[surface] for surface in surfaces}
 
 
 def _signs_at(orbit: Orbit, time: float, state: FloatArray) -> dict[str, int]:

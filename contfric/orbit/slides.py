@@ -30,6 +30,14 @@ def resting_modes(orbit: Orbit) -> set[str]:
     return {mode for mode, _ in orbit.itinerary if orbit.model.is_at_rest(mode)}
 
 
+def time_unit(orbit: Orbit) -> float:
+    """Return the time that short times are a share of: 1, or the period of a motion that is faster.
+
+    In seconds a converter switches within microseconds: times of 1e-3 are long there.
+    """
+    return min(1.0, orbit.period)
+
+
 def slides_of(orbit: Orbit) -> list[int]:
     """Return the segments with which slides of some length begin, joined over a touch of rest.
 
@@ -39,7 +47,7 @@ def slides_of(orbit: Orbit) -> list[int]:
     """
     sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    some = [i for i in range(len(orbit.itinerary)) if lasts[i] > SHORT]
+    some = [i for i in range(len(orbit.itinerary)) if lasts[i] > SHORT * time_unit(orbit)]
     cut = [i for i in some if orbit.itinerary[i - 1] in orbit.model.sections]
     if cut:  # the only joints that are in every itinerary
         return cut
