@@ -127,6 +127,21 @@ def test_study(write, tmp_path: Path) -> None:
         cf.run_study(path, tmp_path / "out2")
 
 
+def test_a_study_of_releases(write, tmp_path: Path) -> None:
+    head = "model: coulomb\nparams: {Omega: 0.35, S: 0.05, S0: 0.4}\n"
+    path = write(head + "release_map: {count: 80}\nfigures: [{kind: release_map}]\n")
+    result = cf.run_study(path, tmp_path / "out")
+    direct = cf.release_map("coulomb", CHAOS, count=80)
+    assert result.release_map is not None
+    np.testing.assert_array_equal(result.release_map.images, direct.images)
+    assert {"release_map.png", "release_map.npz"} <= {
+        file.name for file in (tmp_path / "out").iterdir()
+    }
+    write(head + "release_map: {surface: v}\n")
+    with pytest.raises(cf.StudyError, match=r"scene.yaml:3: .*rest is left at"):
+        cf.run_study(path, tmp_path / "out2")
+
+
 def test_a_state_may_stand_behind_the_parameters() -> None:
     one = cf.poincare("coulomb", START, [0.7, 0.2], section=0.25, periods=8, transient=0)
     other = cf.poincare("coulomb", START, state=[0.7, 0.2], section=0.25, periods=8, transient=0)
