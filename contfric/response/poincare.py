@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from contfric.errors import (
     mapping_of,
     real_number,
 )
 from contfric.models import ModelSource, Parameters
+from contfric.models.definition import Model
 from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
-from contfric.response.collecting import collect
-from contfric.response.cuts import Following
+from contfric.response.collecting import collect, repeats_of
+from contfric.response.cuts import Following, Points
 from contfric.response.outcome import Outcome
 from contfric.response.returns import Returns
 from contfric.response.sections import SectionLike, section_of, usual_section
@@ -68,6 +69,28 @@ def poincare(
     at, one = np.array([begins]), np.array([-1], dtype=np.int64)
     points, ends = collect(model, cut, how, vector[None], (at, y[None], one, 0 * one))
     outcome = list(Outcome)[int(ends.outcomes[0])]
+    if outcome is Outcome.APERIODIC and _repeated(model, model.view(vector).period, points):
+        outcome = Outcome.PERIODIC
     return Returns(
         model, vector, section, outcome, points.cycles, points.modes, points.times, points.states
     )
+
+
+def _repeated(model: Model, period: float, points: Points) -> bool:
+    """Tell whether the last points are those of a cycle before, to within rounding; the phase counts, too."""
+    within, count = repeats_of(model), len(points.times)
+
+    def same(some: slice, others: slice) -> NDArray[np.bool_]:
+        y, z = points.states[some], points.states[others]
+        equal = np.all(np.abs(y - z) <= within * (1.0 + np.abs(z)), axis=1)
+        if period > 0.0:
+            apart = points.times[some] - points.times[others]
+            equal &= np.abs(apart - period * np.round(apart / period)) <= within * (1.0 + period)
+        return np.asarray(equal & (points.modes[some] == points.modes[others]))
+
+    if count < 2:
+        return False
+    before = np.flatnonzero(same(slice(0, count - 1), slice(count - 1, count)))
+    cycle = count - 1 - int(before[-1]) if len(before) else count
+    ends = slice(count - 2 * cycle, count - cycle), slice(count - cycle, count)
+    return 2 * cycle <= count and bool(np.all(same(*ends)))

@@ -174,3 +174,21 @@ def test_what_comes_to_rest_never_again_is_not_waited_for() -> None:
     long, short = (cf.release_map("popp", count=24, periods=periods) for periods in (1e9, 50))
     assert np.any(np.isnan(long.images)) and np.any(np.isfinite(long.images))
     assert long.images.tobytes() == short.images.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("model", "params", "section", "outcome"),
+    [
+        ("coulomb", START, "stops", cf.Outcome.PERIODIC),
+        ("coulomb", START, 0.3, cf.Outcome.PERIODIC),
+        ("coulomb", CHAOS, "stops", cf.Outcome.APERIODIC),
+        ("coulomb", CHAOS, 0.0, cf.Outcome.APERIODIC),
+        ("two-blocks", {}, "first", cf.Outcome.PERIODIC),
+        ("impact", {}, 0.0, cf.Outcome.PERIODIC),
+    ],
+)
+def test_what_repeats_itself_is_periodic(
+    model: str, params: dict[str, float], section: str | float, outcome: cf.Outcome
+) -> None:
+    found = cf.poincare(model, params, section=section, periods=400, transient=2000)
+    assert found.outcome is outcome
