@@ -1,10 +1,11 @@
 """What gradients cost, against the solve of the orbit: ``python benchmarks/gradients.py``.
 
 Each round times all of them once, one after the other, so that what else runs on the machine meets all
-alike; ratios are medians over rounds of the ratio within one. Three solves are compared with: the user's
-call, from nothing; Newton's method from an orbit at parameters a thousandth away, the call of one kernel; and
-a point of a branch, with its multipliers and margins. "orbit" is dz/dp, the derivatives of all joints by all
-parameters, which quantities share; every gradient here has it computed anew.
+alike; ratios are medians over rounds of the ratio within one. Solves are compared with: the user's call, from
+nothing, of a signature and by simulation (find_orbit); Newton's method from an orbit at parameters a
+thousandth away, the call of one kernel; and a point of a branch, with its multipliers and margins. "orbit" is
+dz/dp, the derivatives of all joints by all parameters, which quantities share; every gradient here has it
+computed anew.
 """
 
 from __future__ import annotations
@@ -53,6 +54,7 @@ def calls(name: str) -> dict[str, Callable[[], Any]]:
     moved[0] *= 1.001
     found: dict[str, Callable[[], Any]] = {
         "the user's call": solved,
+        "find_orbit": lambda: cf.find_orbit(orbit.model, params),
         "Newton's method": lambda: refine(replace(orbit, vector=moved)),
     }
     if parameter:
@@ -79,7 +81,9 @@ def main() -> None:
             for each in rounds:
                 each["a branch"] /= points
         solves = [
-            what for what in ("the user's call", "Newton's method", "a branch") if what in timed
+            what
+            for what in ("the user's call", "find_orbit", "Newton's method", "a branch")
+            if what in timed
         ]
         print(
             f"\n{name}: ms, and as a share of {', '.join(solves)} (a branch: of one of its points)"

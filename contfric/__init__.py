@@ -74,7 +74,8 @@ if TYPE_CHECKING:
     from contfric.response.basin_map import basins
     from contfric.response.basins import Basins
     from contfric.response.outcome import Outcome
-    from contfric.response.poincare import poincare, release_map
+    from contfric.response.poincare import poincare
+    from contfric.response.release import release_map
     from contfric.response.returns import ReleaseMap, Returns
     from contfric.response.stable_set import StableSet, stable_set
     from contfric.response.sweep import Sweep
@@ -168,7 +169,7 @@ _HOMES = {
     "period_adding": "contfric.continuation.adding",
     "poincare": "contfric.response.poincare",
     "quantity_names": "contfric.quantities.registry",
-    "release_map": "contfric.response.poincare",
+    "release_map": "contfric.response.release",
     "run_study": "contfric.study",
     "save": "contfric.results",
     "signature_names": "contfric.signature",

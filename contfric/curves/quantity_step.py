@@ -9,7 +9,8 @@ the shortest step :math:`\delta_0` to the orbits, :math:`F'\delta_0 = -F`, the r
 .. math:: r = C'T\,T^T + \frac{C'\delta_0\,\delta_0^T}{\delta_0^T\delta_0}
 
 takes the place of C': both agree in all directions that a step of Newton's method may have. So conditions are
-differentiated in q + 1 directions only.
+differentiated in q + 1 directions only. Of integrals and extrema the row itself is known
+(:mod:`contfric.orbit.integrals`), and nothing of this is needed.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray, System
-from contfric.quantities.extreme import peak_of
+from contfric.quantities.extreme import in_rows, peak_of
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
@@ -148,9 +149,17 @@ class Held:
     def defects(self, orbit: Orbit) -> Defects:
         """Return what vanishes along the curve, with its rows."""
         assert self.quantity is not None
+        if in_rows(self.quantity):
+            found = differentiated(self.quantity, orbit, self._every)
+            return Defects(np.array([found.value - self.value]), found.ahead[None])
         columns = self.in_plane(orbit)
         found = differentiated(self.quantity, orbit, self.directions(columns))
         return Defects(np.array([found.value - self.value]), found.ahead[None] @ spread(columns))
+
+    @cached_property
+    def _every(self) -> Directions:
+        """All scaled directions, one by one: for quantities whose rows are known, whatever the direction."""
+        return self.directions(np.eye(len(self.weights)))
 
     def in_plane(self, orbit: Orbit) -> FloatArray:
         """Return the shortest step to the orbits and the plane of them, scaled, shape (N m + q, 1 + q)."""

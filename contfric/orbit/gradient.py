@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.base.shown import Shown
+from contfric.base.tabled import Columns, Tabled
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sensitivity import joint_sensitivities
@@ -28,7 +28,7 @@ _AT_EVENT = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
-class Gradient(Shown, Mapping[str, float]):
+class Gradient(Tabled, Mapping[str, float]):
     """Derivatives of a quantity by every parameter; a mapping of names to numbers.
 
     Attributes
@@ -60,6 +60,12 @@ class Gradient(Shown, Mapping[str, float]):
     def one_sided(self) -> bool:
         """Whether there is no derivative, but one on each side, or one only."""
         return bool(self.notes)
+
+    def columns(self) -> Columns:
+        """Return one row for each parameter: its name, and the derivatives of both sides."""
+        sides = {"ahead": self.ahead, "behind": self.behind}
+        numbers = {name: np.array([side[n] for n in self]) for name, side in sides.items()}
+        return {"parameter": np.array(list(self)), **numbers}
 
     def __getitem__(self, name: str) -> float:
         return self.ahead[name]

@@ -10,9 +10,12 @@ from contfric.base.shown import Shown
 if TYPE_CHECKING:
     from contfric.models.definition import FloatArray
     from contfric.orbit.gradient import Gradient
+    from contfric.orbit.integrals import Integrals
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.slides import Outline
+    from contfric.orbit.system import IntArray
     from contfric.quantities.registry import QuantityLike
+    from contfric.quantities.tape import Tape
 
 
 class MeasuredOrbit(Shown):
@@ -44,6 +47,22 @@ class MeasuredOrbit(Shown):
         from contfric.orbit.peak import extreme_with_derivatives
 
         return extreme_with_derivatives(cast("Orbit", self), observable, inside, sign)
+
+    def integrals(self, tape: Tape, extra: float, moving: IntArray | None) -> Integrals | None:
+        """Return integrals of expressions over the orbit, with their gradients by joints and parameters.
+
+        None where an expression has a kink inside of a segment, or nothing resolves it: it is then measured
+        by :mod:`contfric.quantities.panels`.
+
+        Parameters
+        ----------
+        tape : the expressions
+        extra : the parameter that follows those of the model
+        moving : the parameters that move; None where no gradients are wanted
+        """
+        from contfric.orbit.integrals import integrals_of
+
+        return integrals_of(cast("Orbit", self), tape, extra, moving)
 
     def quantity(self, name: QuantityLike) -> Any:
         """Return a quantity: by its name, as an expression, or as a function of an orbit.

@@ -6,8 +6,14 @@ import ast
 from typing import NamedTuple
 
 from contfric.models.definition import Model
-from contfric.models.quantity_texts import Functional, Parsed, read
+from contfric.models.quantity_texts import WORK, Functional, Parsed, read
 from contfric.quantities.registry import NAMED, Quantity
+
+
+def is_compiled(functional: Functional, model: Model) -> bool:
+    """Tell whether compiled code integrates a functional: one expression in all modes, of a plain motion."""
+    extreme = functional.kind in ("max", "min", WORK)
+    return not (extreme or functional.contacts or model.chatter_by_mode)
 
 
 class Peak(NamedTuple):
@@ -29,7 +35,11 @@ def peak_of(quantity: Quantity) -> Peak | None:
     """Return a quantity as an extremum; None if it is anything else."""
     model = quantity.model
     functional = _only_functional(quantity.parsed, model)
-    if functional is None or functional.kind not in ("max", "min") or functional.contacts:
+    return None if functional is None else _peak(functional, model)
+
+
+def _peak(functional: Functional, model: Model) -> Peak | None:
+    if functional.kind not in ("max", "min") or functional.contacts:
         return None
     name, sign = functional.text, 1.0 if functional.kind == "max" else -1.0
     if name == model.states[0]:
@@ -38,6 +48,25 @@ def peak_of(quantity: Quantity) -> Peak | None:
         name = model.displacement
     c = model.observable_index.get(name)
     return None if c is None else Peak(c, 1, sign)
+
+
+def in_rows(quantity: Quantity) -> bool:
+    """Tell whether compiled code knows the derivatives of a quantity by all joints and parameters at once."""
+    return quantity.parsed is not None and _in_rows(quantity.parsed, quantity.model)
+
+
+def _in_rows(parsed: Parsed, model: Model) -> bool:
+    own = dict(model.quantities)
+    # an extremum may be reached at both ends of a stick, which move alike along orbits, and nowhere else
+    if not all(is_compiled(functional, model) for functional in parsed.functionals.values()):
+        return False
+    for name in parsed.names - set(model.parameter_names):
+        text = own.get(name) or (NAMED[name].text if name in NAMED else "")
+        if text and not _in_rows(read(text.replace("%s", model.states[0])), model):
+            return False
+        if name in ("multiplier", "impact_velocity"):
+            return False
+    return True
 
 
 def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:

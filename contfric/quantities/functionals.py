@@ -26,8 +26,9 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant, divide
+from contfric.quantities.extreme import is_compiled
 from contfric.quantities.inside import Inside
-from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place
+from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place, moving
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
@@ -58,7 +59,7 @@ class Measuring:
 
     def number(self, value: float, slopes: FloatArray) -> Dual:
         """Return a number with its derivatives, the same on both sides."""
-        return Dual(np.full(2, value), np.tile(slopes, (2, 1)))
+        return Dual(np.array((value, value)), np.array((slopes, slopes)))
 
     def functional(self, asked: Functional) -> Dual:
         """Return a functional as a number."""
@@ -70,7 +71,12 @@ class Measuring:
         if asked.kind in ("amplitude", "phase"):
             return self._harmonic(asked, function)
         squared = asked.kind == "rms"
-        total = self._integral(asked, _squared(function) if squared else function)
+        found = self._compiled(asked)
+        total = (
+            found[0]
+            if found
+            else self._integral(asked, _squared(function) if squared else function)
+        )
         if asked.kind == "integral":
             return total
         mean = _dual(divide(total, self.period()))
@@ -83,6 +89,33 @@ class Measuring:
     def _integral(self, asked: Functional, function: Function, size: float = 0.0) -> Dual:
         value, slopes = integral(self._resolved(self.motion, asked, function, size))
         return self.number(value, np.zeros(self.motion.count) + slopes)
+
+    def _compiled(self, asked: Functional, rate: float = 0.0) -> list[Dual]:
+        """Return what is integrated for a functional by compiled code; nothing where it leaves it to panels.
+
+        Parameters
+        ----------
+        rate : of the waves of a harmonic, which moves against the period
+        """
+        orbit, directions = self.motion.orbit, self.motion.directions
+        if not is_compiled(asked, orbit.model):
+            return []
+        which, d_moving = moving(self.motion.d_vector)
+        found = orbit.integrals(
+            self.inside.tape(asked), rate, None if directions is None else which
+        )
+        if found is None:
+            return []
+        if directions is None:
+            return [self.number(value, np.empty(0)) for value in found.values]
+        by_joints = found.on_joints.reshape(len(found.values), -1)
+        slopes = by_joints @ directions.joints.reshape(-1, self.motion.count)
+        slopes += found.on_parameters[:, :-1] @ d_moving
+        if rate:
+            slopes -= found.on_parameters[:, -1:] * (rate / orbit.period * self.motion.d_period)
+        if not math.isfinite(float(slopes.sum())):
+            return []
+        return [self.number(value, own) for value, own in zip(found.values, slopes, strict=True)]
 
     def _work(self, asked: Functional) -> Dual:
         """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
@@ -117,13 +150,11 @@ class Measuring:
                 f"period(s) has the harmonics 1/{orbit.periods}, 2/{orbit.periods}, ... of the excitation"
             )
         scale = divide(2.0, self.period())
-        parts = [
-            _dual(
-                self._integral(asked, _turning(function, self.motion, round(cycles), wave)) * scale
-            )
+        parts = self._compiled(asked, 2.0 * math.pi * round(cycles) / orbit.period) or [
+            self._integral(asked, _turning(function, self.motion, round(cycles), wave))
             for wave in ("cos", "sin")
         ]
-        a, b = parts[0], -parts[1]
+        a, b = _dual(parts[0] * scale), -_dual(parts[1] * scale)
         if asked.kind == "amplitude":
             return _dual(apply("sqrt", a * a + b * b))
         square = a.values**2 + b.values**2

@@ -19,6 +19,7 @@ from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contac
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function
+from contfric.quantities.tape import Tape, tape_of
 
 
 class Inside:
@@ -42,6 +43,7 @@ class Inside:
         named = [o.name for o in model.observables if o.name not in model.states]
         self.observables = [name for name in named if name not in self.definitions]
         self._functions: WeakKeyDictionary[Functional, Function] = WeakKeyDictionary()
+        self._tapes: WeakKeyDictionary[Functional, Tape] = WeakKeyDictionary()
         self.known = tuple(
             dict.fromkeys(
                 (TIME, *model.states, *named, *self.definitions, *model.parameter_names, PI)
@@ -73,6 +75,14 @@ class Inside:
         if known is None:
             known = self.along(partial(_always, asked.tree), asked.contacts)
             self._functions[asked] = known
+        return known
+
+    def tape(self, asked: Functional) -> Tape:
+        """Return what is integrated for a functional as operations for compiled code."""
+        known = self._tapes.get(asked)
+        if known is None:
+            known = tape_of(self.model, asked.tree, self.definitions, self.observables, asked.kind)
+            self._tapes[asked] = known
         return known
 
     def power(self, contact: str) -> Function:

@@ -103,6 +103,11 @@ def moving(d_vector: FloatArray) -> tuple[IndexArray, FloatArray]:
     return which, np.ascontiguousarray(d_vector[which])
 
 
+def goes_on(model: Model) -> bool:
+    """Tell whether the motion to a node starts at the node before: where it is integrated, step by step."""
+    return model.rounding > _CLOSED
+
+
 @dataclass(frozen=True, eq=False)
 class Segment(Place):
     """A smooth piece of an orbit; derivatives have D columns, none if they are not wanted.
@@ -162,11 +167,9 @@ class Pieces:
         n, columns = len(first.state), first.d_vector.shape[1] + 1 if first.exact else 0
         times, d_times = np.empty(count), np.empty((count, columns))
         states, slopes = np.empty((count, n)), np.empty((count, n, columns))
-        # the motion to a node starts at the node before where it is integrated, step by step
-        chained = first.model.rounding > _CLOSED
         move(
             *(first.model.flow.following(), *self._arrays, first.vector, *moving(first.d_vector)),
-            *(chained, where, shares, times, d_times, states, slopes),
+            *(goes_on(first.model), where, shares, times, d_times, states, slopes),
         )
         return Dual(times, d_times), [
             Dual(states[:, i].copy(), slopes[:, i].copy()) for i in range(n)

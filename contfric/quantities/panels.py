@@ -19,34 +19,34 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.errors import ContfricError
-from contfric.models.definition import FloatArray
+from contfric.models.definition import FloatArray, Model
 from contfric.quantities.duals import Dual, Kinks
 from contfric.quantities.motion import IndexArray, Pieces, Place, Segment
 
 #: Nodes of a panel: a segment of half a period of the excitation is resolved by one panel, or two.
-_NODES = 16
+NODES = 16
 #: Last coefficients of a series, relative to the largest value: the square of it is rounding. Of an
 #: integrated flow no better than its rounding, a hundred times over.
 RESOLVED, _UNITS = 1e-9, 100.0
 #: Rounding of a function, relative to its largest value on the orbit.
-_ROUNDING = 1e-16
+ROUNDING = 1e-16
 #: Coefficients that no longer fall when a panel is halved are noise of the integrator, if they are below this
 #: share of the largest value; a kink or a jump that nobody noted has larger ones.
-_NOISE, _FALLS, _HALVED = 1e-4, 0.7, 4
+NOISE, FALLS, HALVED = 1e-4, 0.7, 4
 #: Halvings of a segment: a billionth of its duration holds nothing that a quantity could feel.
-_DEEPEST = 30
+DEEPEST = 30
 #: An argument of a kink this small, relative to its largest value, has no sign: at a joint it is rounding.
 _NO_SIGN = 1e-12
 #: Distance from a jump at which its sides are evaluated, as a share of the segment: far above rounding, far
 #: below anything that changes.
 _BESIDE = 1e-12
 
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
 #: From the values at the nodes to the coefficients of the Legendre series.
-_SERIES = (
-    (np.arange(_NODES) + 0.5)[:, None]
-    * np.polynomial.legendre.legvander(_POINTS, _NODES - 1).T
-    * _WEIGHTS
+SERIES = (
+    (np.arange(NODES) + 0.5)[:, None]
+    * np.polynomial.legendre.legvander(POINTS, NODES - 1).T
+    * WEIGHTS
 )
 
 #: A function of time along segments, at nodes; the arguments of its kinks are noted.
@@ -69,7 +69,7 @@ class Panel:
 
     def stationary(self) -> FloatArray:
         """Return the shares of the segment at which the function is stationary inside of the panel."""
-        rate = np.polynomial.legendre.legder(_SERIES @ self.values.values)
+        rate = np.polynomial.legendre.legder(SERIES @ self.values.values)
         size = np.max(np.abs(rate))
         last = np.flatnonzero(np.abs(rate) > 1e-14 * size)  # rounding has roots anywhere
         if size == 0.0 or not len(last):
@@ -176,6 +176,11 @@ def evaluated(
         yield rows, found, kinks
 
 
+def resolved_level(model: Model) -> float:
+    """Return the share of the last coefficients at which a panel is resolved."""
+    return max(RESOLVED, _UNITS * model.rounding)
+
+
 def least_size(pieces: Pieces, function: Function) -> float:
     """Return the size below which values of a function, the same in all modes, are rounding of others."""
     parts = _whole(pieces)
@@ -230,14 +235,14 @@ def _least(sampled: _Sampled) -> float:
     largest = 0.0
     for value in sampled.sizes[:, 0].tolist():
         largest = max(largest, value)
-    return _ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
+    return ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
 
 
 def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bool) -> _Sampled:
     """Return a function at the nodes of some parts."""
-    where = np.repeat(np.array([part.index for part in parts], dtype=np.int64), _NODES)
+    where = np.repeat(np.array([part.index for part in parts], dtype=np.int64), NODES)
     low, high = np.array([[part.low, part.high] for part in parts]).T[:, :, None]
-    shares = (low + 0.5 * (high - low) * (_POINTS + 1.0)).ravel()
+    shares = (low + 0.5 * (high - low) * (POINTS + 1.0)).ravel()
     columns = np.empty((0, 0))
     changing: dict[int, list[Dual]] = {}
     for rows, values, kinks in evaluated(pieces, function, where, shares, by_mode):
@@ -245,15 +250,15 @@ def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bo
             columns = np.empty((len(where), 1 + values.slopes.shape[1]))
         columns[rows, 0], columns[rows, 1:] = values.values, values.slopes
         arguments = np.array([a.values for a in kinks.arguments]).reshape(
-            -1, len(rows) // _NODES, _NODES
+            -1, len(rows) // NODES, NODES
         )
         both = (arguments.min(axis=2) < 0.0) & (arguments.max(axis=2) > 0.0)
         for k in np.flatnonzero(both.any(axis=0)).tolist():
-            own = slice(k * _NODES, (k + 1) * _NODES)
-            changing[int(rows[own][0]) // _NODES] = [a[own] for a in kinks.arguments]
-    by_part = columns.reshape(len(parts), _NODES, -1)
+            own = slice(k * NODES, (k + 1) * NODES)
+            changing[int(rows[own][0]) // NODES] = [a[own] for a in kinks.arguments]
+    by_part = columns.reshape(len(parts), NODES, -1)
     with np.errstate(all="ignore"):
-        tail = np.max(np.abs(_SERIES[-2:] @ by_part), axis=1)
+        tail = np.max(np.abs(SERIES[-2:] @ by_part), axis=1)
     return _Sampled(by_part, tail, np.max(np.abs(by_part), axis=1), changing)
 
 
@@ -267,7 +272,7 @@ def _judged(
         raise ContfricError(
             f"{found.what} has no finite value in segment {segment.index + 1} near t = {time:.6g}"
         )
-    shares = low + 0.5 * (high - low) * (_POINTS + 1.0)
+    shares = low + 0.5 * (high - low) * (POINTS + 1.0)
     cut = _change(found, shares, sampled.kinks[k]) if k in sampled.kinks else None
     if cut is not None and low < cut.share < high:
         found.cuts.append(cut)
@@ -275,12 +280,12 @@ def _judged(
             _Part(part.index, low, cut.share, part.depth, size),
             _Part(part.index, cut.share, high, part.depth, size),
         ]
-    level = max(RESOLVED, _UNITS * segment.model.rounding)
-    noise = part.depth >= _HALVED and _FALLS * part.before < left < _NOISE
+    level = resolved_level(segment.model)
+    noise = part.depth >= HALVED and FALLS * part.before < left < NOISE
     if left <= level or noise:
         found.panels.append(Panel(low, high, sampled.values(k)))
         return []
-    if part.depth == _DEEPEST:
+    if part.depth == DEEPEST:
         time = segment.start + low * segment.lasts
         raise ContfricError(
             f"{found.what} is not smooth near t = {time:.12g}: no panel resolves it"
@@ -303,11 +308,11 @@ def integral(resolved: Sequence[Resolved]) -> tuple[float, FloatArray]:
         return 0.0, jumps
     half = np.array([0.5 * (panel.high - panel.low) for _, panel in panels])
     lasts = np.array([segment.lasts for segment, _ in panels])
-    means = half * np.array([_WEIGHTS @ panel.values.values for _, panel in panels])
+    means = half * np.array([WEIGHTS @ panel.values.values for _, panel in panels])
     value = math.fsum(means * lasts)
     if not panels[0][0].exact:
         return value, jumps
-    slopes = np.array([_WEIGHTS @ panel.values.slopes[:, :-1] for _, panel in panels])
+    slopes = np.array([WEIGHTS @ panel.values.slopes[:, :-1] for _, panel in panels])
     d_lasts = np.array([segment.d_lasts for segment, _ in panels])
     return value, jumps + (half * lasts) @ slopes + means @ d_lasts
 

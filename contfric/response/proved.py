@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.base.extras import need_flint
-from contfric.response.poincare import _image_of, _release_of
+from contfric.response.release import image_of, release_of
 from contfric.response.returns import ReleaseMap
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ def horseshoe_of(releases: ReleaseMap, most: int) -> Horseshoe:
     from contfric.certify.returns import Release
 
     model = releases.model
-    way, rests = _release_of(model, releases.surface)
-    image = _image_of(model, way)
+    way, rests = release_of(model, releases.surface)
+    image = image_of(model, way)
     surfaces = [s.name for s in model.surfaces]
     release = Release(
         releases.mode,

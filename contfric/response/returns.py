@@ -30,7 +30,7 @@ class Returns(Tabled):
     section : str or float
         What the points lie on.
     outcome : Outcome
-        What the solution came to.
+        What the solution came to: PERIODIC if its last points repeat those before; all points are kept.
     cycles, modes : ndarray, shape (k,)
         Periods completed, and number of the mode that met the section.
     times : ndarray, shape (k,)

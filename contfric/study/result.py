@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from contfric.fitting.result import Fit
     from contfric.orbit.orbit import Orbit
     from contfric.response.basins import Basins
-    from contfric.response.returns import Returns
+    from contfric.response.returns import ReleaseMap, Returns
     from contfric.response.stable_set import StableSet
     from contfric.response.sweep import Sweep
     from contfric.study.tasks.task import Found
@@ -56,8 +56,8 @@ class StudyResult(Shown):
         Whether a checkpoint was left, from which the same call goes on.
     found : dict
         What was found, by its name: ``orbit``, ``diagram``, ``plane``, ``lyapunov``, ``sweep``, ``poincare``,
-        ``basins``, ``equilibria``, ``ensemble``. Each is an attribute, too; None if it was not asked
-        for, or the run was interrupted before.
+        ``release_map``, ``basins``, ``equilibria``, ``ensemble``. Each is an attribute, too; None if it was
+        not asked for, or the run was interrupted before.
     """
 
     study: Study
@@ -103,6 +103,11 @@ class StudyResult(Shown):
     def poincare(self) -> Returns | None:
         """The points of a section."""
         return self.found.get("poincare")
+
+    @property
+    def release_map(self) -> ReleaseMap | None:
+        """The map of releases."""
+        return self.found.get("release_map")
 
     @property
     def basins(self) -> Basins | None:

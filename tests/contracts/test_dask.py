@@ -1,4 +1,4 @@
-"""A local dask cluster of two workers: sweeps, basins and ensembles have the bits of one process."""
+"""A local dask cluster of two workers: tiles of every kind have the bits of one process."""
 
 from __future__ import annotations
 
@@ -49,6 +49,14 @@ def test_basins(executor: Executor) -> None:
         found = cf.basins("coulomb", starts, PARAMS, tile=60, **options)
         assert found.complete
         return found.labels.tobytes() + found.motions.tobytes()
+
+    assert compute(executor=executor) == compute()
+
+
+def test_a_release_map(executor: Executor) -> None:
+    def compute(**options: Any) -> bytes:
+        found = cf.release_map("coulomb", PARAMS, count=80, tile=20, **options)
+        return found.images.tobytes() + found.branch.tobytes()
 
     assert compute(executor=executor) == compute()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.errors import ResultFileError
 
 CHAOS = {"Omega": 0.35, "S": 0.05, "S0": 0.4}
 START = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -125,7 +127,68 @@ def test_study(write, tmp_path: Path) -> None:
         cf.run_study(path, tmp_path / "out2")
 
 
+def test_a_study_of_releases(write, tmp_path: Path) -> None:
+    head = "model: coulomb\nparams: {Omega: 0.35, S: 0.05, S0: 0.4}\n"
+    path = write(head + "release_map: {count: 80}\nfigures: [{kind: release_map}]\n")
+    result = cf.run_study(path, tmp_path / "out")
+    direct = cf.release_map("coulomb", CHAOS, count=80)
+    assert result.release_map is not None
+    np.testing.assert_array_equal(result.release_map.images, direct.images)
+    assert {"release_map.png", "release_map.npz"} <= {
+        file.name for file in (tmp_path / "out").iterdir()
+    }
+    write(head + "release_map: {surface: v}\n")
+    with pytest.raises(cf.StudyError, match=r"scene.yaml:3: .*rest is left at"):
+        cf.run_study(path, tmp_path / "out2")
+
+
 def test_a_state_may_stand_behind_the_parameters() -> None:
     one = cf.poincare("coulomb", START, [0.7, 0.2], section=0.25, periods=8, transient=0)
     other = cf.poincare("coulomb", START, state=[0.7, 0.2], section=0.25, periods=8, transient=0)
     np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_a_release_map_has_the_same_bits_wherever_its_tiles_are_computed(tmp_path: Path) -> None:
+    said: list[str] = []
+
+    def bits(found: cf.ReleaseMap) -> bytes:
+        arrays = (found.images, found.returns, found.branch, found.states)
+        return b"".join(array.tobytes() for array in arrays)
+
+    plain = bits(cf.release_map("coulomb", CHAOS, count=120))
+    with ThreadPoolExecutor(2) as executor:
+        spread = cf.release_map("coulomb", CHAOS, count=120, executor=executor, tile=7)
+    assert bits(spread) == plain
+    kept: dict[str, Any] = {"count": 120, "tile": 50, "folder": tmp_path}
+    assert bits(cf.release_map("coulomb", CHAOS, **kept)) == plain
+    tiles = sorted(tmp_path.glob("tile-*.npz"))
+    tiles[0].unlink()
+    assert bits(cf.release_map("coulomb", CHAOS, **kept, progress=said.append)) == plain
+    assert f"{len(tiles) - 1} of {len(tiles)} tiles" in said[0]
+    with pytest.raises(ResultFileError):
+        cf.release_map("coulomb", START, **kept)
+
+
+def test_what_comes_to_rest_never_again_is_not_waited_for() -> None:
+    """Some releases of this block lead to a motion that slides for ever, however long it is followed."""
+    long, short = (cf.release_map("popp", count=24, periods=periods) for periods in (1e9, 50))
+    assert np.any(np.isnan(long.images)) and np.any(np.isfinite(long.images))
+    assert long.images.tobytes() == short.images.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("model", "params", "section", "outcome"),
+    [
+        ("coulomb", START, "stops", cf.Outcome.PERIODIC),
+        ("coulomb", START, 0.3, cf.Outcome.PERIODIC),
+        ("coulomb", CHAOS, "stops", cf.Outcome.APERIODIC),
+        ("coulomb", CHAOS, 0.0, cf.Outcome.APERIODIC),
+        ("two-blocks", {}, "first", cf.Outcome.PERIODIC),
+        ("impact", {}, 0.0, cf.Outcome.PERIODIC),
+    ],
+)
+def test_what_repeats_itself_is_periodic(
+    model: str, params: dict[str, float], section: str | float, outcome: cf.Outcome
+) -> None:
+    found = cf.poincare(model, params, section=section, periods=400, transient=2000)
+    assert found.outcome is outcome

@@ -16,6 +16,7 @@ from contfric.study.tasks.orbit import Start
 from contfric.study.tasks.plane import PlaneTask
 from contfric.study.tasks.poincare import PoincareTask
 from contfric.study.tasks.quantity_curves import ExtremumTask, HoldTask
+from contfric.study.tasks.release_map import ReleaseMapTask
 from contfric.study.tasks.stable_set import StableSetTask
 from contfric.study.tasks.sweep import SweepTask
 from contfric.study.tasks.task import Task
@@ -28,6 +29,7 @@ TASKS: tuple[type[Task], ...] = (
     LyapunovTask,
     SweepTask,
     PoincareTask,
+    ReleaseMapTask,
     BasinsTask,
     StableSetTask,
     HoldTask,

@@ -1,0 +1,270 @@
+"""Expressions at the nodes of a part of a segment, and what is left over there, compiled.
+
+A part is resolved where the last coefficients of its Legendre series are small enough
+(:mod:`contfric.quantities.panels`), or where coefficients fall so fast that those which Gauss' formula
+misses, from twice the degree on, are rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from contfric.compiled import allocating_helper, helper
+from contfric.models.definition import FloatArray
+from contfric.orbit.equations import EquationWorkspace, equation_workspace
+from contfric.orbit.system import IntArray
+from contfric.quantities.operations import differentiate_tape, evaluate_tape
+from contfric.quantities.panels import (
+    DEEPEST,
+    FALLS,
+    HALVED,
+    NODES,
+    NOISE,
+    POINTS,
+    ROUNDING,
+    SERIES,
+    WEIGHTS,
+)
+
+#: The last eight coefficients of a Legendre series, from the values at the nodes.
+_LAST = np.ascontiguousarray(SERIES[-8:])
+#: Pairs of coefficients from the last one to twice the degree; a third of them that are compared.
+_PAIRS, _THIRD = 8.0, 1.0 / 3.0
+#: Entries of a part that waits: its ends, depth, the share of noise of the part that it is a half of, in
+#: values alone and with derivatives; then sizes.
+LOW, HIGH, DEPTH, LIGHT, EXACT, SIZES = range(6)
+
+
+class Chain(NamedTuple):
+    """The last node of a segment, from which the next one is reached; allocated once.
+
+    Attributes
+    ----------
+    after : its time after the start of the segment, shape (1,); negative before the first node
+    state, jac : its state, with the derivatives by start time, start state, time after it and parameters
+    step, moved : derivatives of one step, and those that are made of both
+    grads : gradients of the observables in the tape
+    which : the parameters that move; jac, grads and this are empty where no derivatives are wanted
+    """
+
+    after: FloatArray
+    state: FloatArray
+    jac: FloatArray
+    step: FloatArray
+    moved: FloatArray
+    grads: FloatArray
+    which: IntArray
+
+
+class IntegralWorkspace(NamedTuple):
+    """Workspace of integrals; allocated once. C is 1, and where derivatives are wanted 4 + n + parameters.
+
+    Attributes
+    ----------
+    equations : for the segments of the whole orbit
+    exact, light : the last node, with derivatives if any are wanted, and without
+    values, weights : of the operations of the tape
+    gradient : of an output by time, states and parameters
+    signs : least and largest noted arguments, shape (noted, 2)
+    data, values_only : outputs at the nodes of a part, shapes (L, nodes, C) and (L, nodes, 1)
+    row : integral over a segment and its gradient, shape (L, C)
+    least : sizes below which values are rounding, shape (L,)
+    waiting : parts of a segment that are to be resolved
+    """
+
+    equations: EquationWorkspace
+    exact: Chain
+    light: Chain
+    values: FloatArray
+    weights: FloatArray
+    gradient: FloatArray
+    signs: FloatArray
+    data: FloatArray
+    values_only: FloatArray
+    row: FloatArray
+    least: FloatArray
+    waiting: FloatArray
+
+
+@allocating_helper
+def chain_workspace(size, n, which, exact):  # type: ignore[no-untyped-def]
+    """Return the workspace of a chain of nodes, for a tape of so many operations."""
+    free = which.shape[0]
+    rows, wide = (n, 2 + n + free) if exact else (0, 0)
+    return Chain(
+        np.empty(1),
+        np.empty(n),
+        np.empty((rows, wide)),
+        np.empty((rows, wide)),
+        np.empty((rows, wide)),
+        np.empty((size, 1 + n + free if exact else 0)),
+        which,
+    )
+
+
+@allocating_helper
+def integral_workspace(tape, whole, m, parameters, which, none, exact, columns):  # type: ignore[no-untyped-def]
+    """Return the workspace for an orbit of so many segments."""
+    n, size, outputs = m - 1, tape.operations.shape[0], tape.outputs.shape[0]
+    return IntegralWorkspace(
+        equation_workspace(whole, m, which.shape[0]),
+        chain_workspace(size, n, which, exact),
+        chain_workspace(size, n, none, False),
+        np.empty(size),
+        np.empty(size),
+        np.empty(2 + n + parameters),
+        np.empty((tape.noted.shape[0], 2)),
+        np.empty((outputs, NODES, columns)),
+        np.empty((outputs, NODES, 1)),
+        np.empty((outputs, columns)),
+        np.zeros(outputs),
+        np.empty((DEEPEST + 2, SIZES + outputs)),
+    )
+
+
+@helper
+def reach_node(functions, mode, start, begin, after, chained, p, chain, before):  # type: ignore[no-untyped-def]
+    """Move to a time after the start of a segment: from there, or from the last node."""
+    n, since, jac, step = begin.shape[0], chain.after[0], chain.jac, chain.step
+    chain.after[0] = after
+    if not chained or since < 0.0 or after < since:
+        functions.flow(mode, start, begin, after, p, chain.which, chain.state, jac)
+        return
+    for i in range(n):
+        before[i] = chain.state[i]
+    functions.flow(mode, start + since, before, after - since, p, chain.which, chain.state, step)
+    for i in range(jac.shape[0]):
+        for k in range(jac.shape[1]):
+            value = step[i, k] if k == 0 or k > n else 0.0
+            if k != 1 + n:  # the time of the last node does not move with that of this one
+                for j in range(n):
+                    value += step[i, 1 + j] * jac[j, k]
+            chain.moved[i, k] = value
+    for i in range(jac.shape[0]):
+        for k in range(jac.shape[1]):
+            jac[i, k] = chain.moved[i, k]
+
+
+@helper
+def write_gradient(gradient, jac, which, share, out):  # type: ignore[no-untyped-def]
+    """Write a gradient by time, states and parameters by start, state, duration and what moves."""
+    n, wide = jac.shape
+    for c in range(wide):
+        value = 0.0
+        for i in range(n):
+            value += gradient[1 + i] * jac[i, c]
+        if c == 0:
+            value += gradient[0]
+        elif c == 1 + n:
+            value = share * (value + gradient[0])
+        elif c > 1 + n:
+            value += gradient[1 + n + which[c - 2 - n]]
+        out[1 + c] = value
+    out[1 + wide] = gradient[gradient.shape[0] - 1]
+
+
+@helper
+def sample_part(  # type: ignore[no-untyped-def]
+    functions, tape, mode, start, begin, lasts, low, high, chained, p, extra, own, chain, data
+):
+    """Write outputs and their gradients at the nodes of a part; False if a noted argument changes sign."""
+    signs, between = own.signs, own.equations.between
+    for q in range(signs.shape[0]):
+        signs[q, 0], signs[q, 1] = np.inf, -np.inf
+    for k in range(NODES):
+        share = low + 0.5 * (high - low) * (POINTS[k] + 1.0)
+        time = start + share * lasts
+        reach_node(functions, mode, start, begin, share * lasts, chained, p, chain, between)
+        evaluate_tape(
+            functions, tape, time, chain.state, p, chain.which, extra, own.values, chain.grads
+        )
+        for q in range(signs.shape[0]):
+            value = own.values[tape.noted[q]]
+            signs[q, 0], signs[q, 1] = min(signs[q, 0], value), max(signs[q, 1], value)
+        for j in range(data.shape[0]):
+            output = tape.outputs[j]
+            data[j, k, 0] = own.values[output]
+            if data.shape[2] > 1:
+                n = begin.shape[0]
+                differentiate_tape(
+                    tape, output, n, chain.which, own.values, chain.grads, own.weights, own.gradient
+                )
+                write_gradient(own.gradient, chain.jac, chain.which, share, data[j, k])
+    for q in range(signs.shape[0]):
+        if signs[q, 0] < 0.0 and signs[q, 1] > 0.0:
+            return False
+    return True
+
+
+@helper
+def left_over(column, size):  # type: ignore[no-untyped-def]
+    """Return the largest of the last two coefficients of a series, and what Gauss' formula misses; by size.
+
+    That formula is exact to twice the degree. What it misses is of the size of the coefficients from there
+    on, if coefficients, in pairs, go on to fall at least as slowly as they did over the last four pairs.
+    """
+    top, one, two, three, four = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(NODES):
+        top = max(top, abs(column[k]))
+    for j in range(8):
+        value = 0.0
+        for k in range(NODES):
+            value += _LAST[j, k] * column[k]
+        value = abs(value)
+        if j < 2:
+            one = max(one, value)
+        elif j < 4:
+            two = max(two, value)
+        elif j < 6:
+            three = max(three, value)
+        else:
+            four = max(four, value)
+    own = max(top, size, 1e-300)
+    if four == 0.0:
+        return 0.0, 0.0
+    fall = max(
+        four / max(three, four), math.sqrt(four / max(two, four)), (four / max(one, four)) ** _THIRD
+    )
+    return four / own, four / own * fall**_PAIRS
+
+
+@helper
+def noise_of(data, sizes):  # type: ignore[no-untyped-def]
+    """Return the largest of what is left over in a part, see :func:`left_over`; sizes grow to those there."""
+    left, missed = 0.0, 0.0
+    for j in range(data.shape[0]):
+        for k in range(NODES):
+            for c in range(data.shape[2]):
+                if not math.isfinite(data[j, k, c]):
+                    return np.inf, np.inf
+            sizes[j] = max(sizes[j], abs(data[j, k, 0]))
+        for c in range(data.shape[2]):
+            tail, beyond = left_over(data[j, :, c], sizes[j])
+            left, missed = max(left, tail), max(missed, beyond)
+    return left, missed
+
+
+@helper
+def resolved(data, waiting, before, level):  # type: ignore[no-untyped-def]
+    """Return what is left over in a part, and whether it is resolved; sizes of the part grow.
+
+    ``before`` is where what was left over of the whole stands, of which it is a half.
+    """
+    left, missed = noise_of(data, waiting[SIZES:])
+    noise = waiting[DEPTH] >= HALVED and FALLS * waiting[before] < left < NOISE
+    return left, left <= level or noise or (left < NOISE and missed < ROUNDING)
+
+
+@helper
+def add_part(data, low, high, lasts, row):  # type: ignore[no-untyped-def]
+    """Add a resolved part to the integral over its segment, and to the gradient of that."""
+    half = 0.5 * (high - low)
+    for j in range(data.shape[0]):
+        for c in range(data.shape[2]):
+            mean = 0.0
+            for k in range(NODES):
+                mean += WEIGHTS[k] * data[j, k, c]
+            row[j, c] += half * lasts * mean

@@ -1,0 +1,326 @@
+r"""Integrals of expressions over an orbit, with their gradients by joints and parameters, compiled.
+
+A segment starts at :math:`(t_0, y_0)` and lasts d. At the share s of it the expression is :math:`g(t, y, p)`
+with :math:`t = t_0 + s d`, :math:`y = \varphi(t_0, y_0, s d; p)`, and its integral is
+
+.. math:: I = d \int_0^1 g\,ds, \qquad \nabla I = d \int_0^1 \nabla g\,ds + (\nabla d) \int_0^1 g\,ds .
+
+:math:`\nabla g` by :math:`(t_0, y_0, d, p)` is the gradient of g by (t, y, p), one pass backwards
+(:mod:`contfric.quantities.tape`), times the derivatives of the flow. So the derivatives are one row by joints
+and parameters, as that of an extremum is (:mod:`contfric.orbit.peak`), whatever the number of directions
+that it is asked for in. Expression and derivatives are resolved on the panels of
+:mod:`contfric.quantities.panels`, by the same rules. Where an argument of ``abs``, ``sign`` or ``where``
+changes its sign inside of a panel, or nothing resolves it, this says so, and the panels of Python decide.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numba import types
+
+from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.flow.layouts import FlowType
+from contfric.models.definition import FloatArray
+from contfric.orbit.after_reset import apply_reset
+from contfric.orbit.equations import LayoutType
+from contfric.orbit.integral_parts import (
+    DEPTH,
+    EXACT,
+    HIGH,
+    LIGHT,
+    LOW,
+    SIZES,
+    add_part,
+    integral_workspace,
+    resolved,
+    sample_part,
+)
+from contfric.orbit.peak import Extreme, ExtremeType, extreme_workspace, fill_cycle
+from contfric.orbit.system import IntArray
+from contfric.quantities.motion import goes_on
+from contfric.quantities.panels import DEEPEST, NODES, RESOLVED, ROUNDING, resolved_level
+from contfric.quantities.tape import Tape
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+
+TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
+
+
+@helper
+def over_segment(  # type: ignore[no-untyped-def]
+    functions, tape, mode, start, begin, lasts, level, chained, p, extra, own
+):
+    """Write the integral over a segment, and its gradient; False if it is left to others.
+
+    The values alone, which cost a fraction of the derivatives, say first which parts there are.
+    """
+    waiting, row, data, light = own.waiting, own.row, own.data, own.values_only
+    row[:, :] = 0.0
+    waiting[0, LOW], waiting[0, HIGH], waiting[0, DEPTH] = 0, 1, 0
+    waiting[0, LIGHT], waiting[0, EXACT] = np.inf, np.inf
+    for j in range(data.shape[0]):
+        waiting[0, SIZES + j] = own.least[j]
+    count = 1
+    own.exact.after[0], own.light.after[0] = -1.0, -1.0
+    while count > 0:
+        count -= 1
+        low, high, depth = waiting[count, LOW], waiting[count, HIGH], waiting[count, DEPTH]
+        if not sample_part(
+            functions,
+            tape,
+            mode,
+            start,
+            begin,
+            lasts,
+            low,
+            high,
+            chained,
+            p,
+            extra,
+            own,
+            own.light,
+            light,
+        ):
+            return False
+        left, fine = resolved(light, waiting[count], LIGHT, level)
+        with_slopes = np.inf
+        if fine and data.shape[2] == 1:
+            add_part(light, low, high, lasts, row)
+            continue
+        if fine:
+            sample_part(
+                functions,
+                tape,
+                mode,
+                start,
+                begin,
+                lasts,
+                low,
+                high,
+                chained,
+                p,
+                extra,
+                own,
+                own.exact,
+                data,
+            )
+            with_slopes, fine = resolved(data, waiting[count], EXACT, level)
+            if fine:
+                add_part(data, low, high, lasts, row)
+                continue
+        if depth >= DEEPEST or not left < np.inf:
+            return False
+        middle = 0.5 * (low + high)
+        waiting[count + 1, LOW], waiting[count + 1, HIGH] = low, middle
+        waiting[count, LOW] = middle
+        for j in range(data.shape[0]):
+            waiting[count + 1, SIZES + j] = waiting[count, SIZES + j]
+        for k in range(count, count + 2):
+            waiting[k, DEPTH], waiting[k, LIGHT], waiting[k, EXACT] = (
+                depth + 1,
+                left,
+                with_slopes,
+            )
+        count += 2
+    if data.shape[2] > 1:  # the mean times how the duration moves
+        for j in range(data.shape[0]):
+            row[j, 2 + begin.shape[0]] += row[j, 0] / lasts
+    return True
+
+
+@helper
+def add_to_joints(layout, whole, i, row, reset, on_joints, on_parameters, d_period):  # type: ignore[no-untyped-def]
+    """Add the gradient of an integral over segment i of the whole orbit to that by the joints of one turn.
+
+    Parameters
+    ----------
+    row : by start time, start state, duration, parameters and the extra one, behind the value
+    reset : derivatives of the reset in which the segment begins
+    """
+    count, m = on_joints.shape
+    n, base, free = m - 1, i % count, d_period.shape[0]
+    if whole.resets[i] >= 0:
+        for k in range(free):
+            for j in range(n):
+                row[3 + n + k] += row[2 + j] * reset[j, 1 + n + k]
+        for j in range(n):
+            row[1] += row[2 + j] * reset[j, 0]
+    for k in range(n):
+        value = row[2 + k]
+        if whole.resets[i] >= 0:
+            value = 0.0
+            for j in range(n):
+                value += row[2 + j] * reset[j, 1 + k]
+        if i < count:
+            on_joints[base, 1 + k] += value
+            continue
+        for j in range(n):
+            on_joints[base, 1 + j] += value * layout.closure[k, j]
+    by_start, by_duration, by_turn = row[1], row[2 + n], 0.0
+    on_joints[base, 0] += by_start - by_duration
+    if layout.turn == 0.0 and i < count < whole.modes.shape[0]:
+        on_joints[0, 0] += by_start  # the end of the whole orbit is at time 0
+    if i >= count:
+        by_turn += by_start
+    if base + 1 < count:
+        on_joints[base + 1, 0] += by_duration
+    elif layout.turn != 0.0:
+        on_joints[0, 0] += by_duration
+        by_turn += by_duration
+    for k in range(free):
+        on_parameters[k] += row[3 + n + k] + by_turn * layout.turn * d_period[k]
+    on_parameters[free] += row[3 + n + free]
+
+
+@kernel(
+    types.boolean(
+        *(FlowType, LayoutType, ExtremeType, TapeType, matrix, vector, indices, f8, f8, i8),
+        *(vector, blocks, matrix),
+    )
+)
+def integrate(  # type: ignore[no-untyped-def]
+    functions,
+    layout,
+    whole_orbit,
+    tape,
+    z,
+    p,
+    which,
+    extra,
+    level,
+    chained,
+    out,
+    on_joints,
+    on_parameters,
+):
+    """Write the integrals of L expressions over an orbit, and their gradients; False if it is left to others.
+
+    Parameters
+    ----------
+    whole_orbit : an extremum, of which the layout of the whole orbit is used
+    which : the parameters that move, none where no gradients are wanted
+    extra : the parameter that follows those of the model
+    level : share of the last coefficients at which a part is resolved
+    chained : 1 where the motion to a node starts at the node before
+    out : shape (L,)
+    on_joints : by the joints, shape (L, N, m), or (0, N, m) where no gradients are wanted
+    on_parameters : by the parameters that move and the extra one, shape (L, len(which) + 1)
+    """
+    count, m = z.shape
+    n, free, exact, whole = m - 1, which.shape[0], on_joints.shape[0] > 0, whole_orbit.whole
+    length, outputs = whole.modes.shape[0], out.shape[0]
+    columns = 4 + n + free if exact else 1
+    d_period, none = np.zeros(free), np.empty(0, dtype=np.int64)
+    own = integral_workspace(tape, length, m, p.shape[0], which, none, exact, columns)
+    orbit = extreme_workspace(length, m, min(count, 0))
+    fill_cycle(functions, layout, whole_orbit, z, p, orbit)
+    turn = 0.0
+    if layout.turn != 0.0:
+        turn = layout.turn * functions.period(p, none, own.equations.empty)
+        functions.period(p, own.exact.which, d_period)
+    begins, lasts = np.empty((length, n)), np.empty(length)
+    for i in range(length):
+        joint, base = orbit.cycle[i], i % count
+        end = z[base + 1, 0] if base + 1 < count else 0.0 if turn == 0.0 else z[0, 0] + turn
+        lasts[i] = end - z[base, 0]
+        begins[i] = joint[1:]
+        if whole.resets[i] >= 0:
+            apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
+            begins[i] = own.equations.behind[n, :n]
+        own.light.after[0] = -1.0
+        if not lasts[i] > 0.0:
+            continue
+        sample_part(
+            functions,
+            tape,
+            whole.modes[i],
+            joint[0],
+            begins[i],
+            lasts[i],
+            0.0,
+            1.0,
+            chained == 1,
+            p,
+            extra,
+            own,
+            own.light,
+            own.values_only,
+        )
+        for j in range(outputs):
+            for k in range(NODES):
+                size = abs(own.values_only[j, k, 0]) * (ROUNDING / RESOLVED)
+                own.least[j] = max(own.least[j], size)
+    out[:] = 0.0
+    on_joints[:, :, :] = 0.0
+    on_parameters[:, :] = 0.0
+    for i in range(length):
+        joint = orbit.cycle[i]
+        if not lasts[i] > 0.0:
+            continue
+        if not over_segment(
+            functions,
+            tape,
+            whole.modes[i],
+            joint[0],
+            begins[i],
+            lasts[i],
+            level,
+            chained == 1,
+            p,
+            extra,
+            own,
+        ):
+            return False
+        if whole.resets[i] >= 0 and exact:
+            apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
+        for j in range(outputs):
+            out[j] += own.row[j, 0]
+            if exact:
+                add_to_joints(
+                    layout,
+                    whole,
+                    i,
+                    own.row[j],
+                    own.equations.behind,
+                    on_joints[j],
+                    on_parameters[j],
+                    d_period,
+                )
+    return True
+
+
+class Integrals(NamedTuple):
+    """Integrals over an orbit; gradients are empty where they were not asked for.
+
+    Attributes
+    ----------
+    values : shape (L,)
+    on_joints : by the joints of one turn, shape (L, N, m)
+    on_parameters : by the parameters that move and the extra one, shape (L, moving + 1)
+    """
+
+    values: FloatArray
+    on_joints: FloatArray
+    on_parameters: FloatArray
+
+
+def integrals_of(
+    orbit: Orbit, tape: Tape, extra: float, moving: IntArray | None
+) -> Integrals | None:
+    """Return what :meth:`contfric.Orbit.integrals` does."""
+    system, joints, model = orbit.system, np.ascontiguousarray(orbit.joints), orbit.model
+    count, rows = len(tape.outputs), 0 if moving is None else len(tape.outputs)
+    which = np.empty(0, dtype=np.int64) if moving is None else moving
+    found = Integrals(
+        np.empty(count), np.empty((rows, *joints.shape)), np.empty((rows, len(which) + 1))
+    )
+    whole = Extreme(-1, 0, 1.0, orbit.as_whole().system.layout)
+    done = integrate(
+        *(system.functions(), system.layout, whole, tape, joints, orbit.vector, which, extra),
+        *(resolved_level(model), int(goes_on(model)), *found),
+    )
+    return found if done and math.isfinite(sum(found.values.tolist())) else None

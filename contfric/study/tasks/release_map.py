@@ -1,0 +1,73 @@
+"""``release_map``: the map from the phase of one release from rest to that of the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from contfric.study.tasks.response import Response
+from contfric.study.tasks.task import FigureKind, Job, attempt
+
+if TYPE_CHECKING:
+    from contfric.base.yaml_lines import LocatedYaml
+    from contfric.models.definition import Model
+    from contfric.response.returns import ReleaseMap
+    from contfric.study.read import Study
+    from contfric.study.schema import StudyFile
+
+
+class ReleaseMapTask(Response):
+    """The one-dimensional map of releases."""
+
+    name = "release_map"
+    result = "release_map"
+    saved_as = "release_map.npz"
+    row_text = "one row a release"
+    figures: ClassVar = {"release_map": FigureKind(6.4, 6.0)}
+
+    surface: str | None = Field(None, description="the name of a surface that rest is left at")
+    count: int | None = Field(
+        None, ge=2, description="a whole number >= 2: phases at which releases are looked for"
+    )
+    periods: float | None = Field(
+        None, gt=0.0, description="a number > 0: periods within which the next release has to come"
+    )
+
+    def check(
+        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
+    ) -> None:
+        """Check that releases of the model are told by their phase, and the surface."""
+        from contfric.response.release import release_of
+
+        attempt(located, (self.name,), lambda: release_of(model, self.surface))
+
+    def does(self, study: Study) -> str:
+        """Return the map in words."""
+        return f"the map of releases{f' at {self.surface}' if self.surface else ''}"
+
+    def compute(self, job: Job) -> ReleaseMap:
+        """Follow every release; a killed run goes on from its tiles."""
+        from contfric.response.release import release_map
+
+        given = {"folder": job.tiles, "progress": job.say, **self.options()}
+        return release_map(job.study.model, job.study.params, **given)
+
+    def entry(self, found: ReleaseMap) -> dict[str, Any]:
+        """Return the numbers of releases, of those without a next one, and of branches."""
+        return {
+            "surface": found.surface,
+            "releases": len(found),
+            "without": int(np.sum(np.isnan(found.images))),
+            "branches": len(set(found.branch[found.branch >= 0].tolist())),
+        }
+
+    @classmethod
+    def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
+        """Yield those numbers."""
+        yield (
+            f"{entry['releases']} releases at {entry['surface']}, {entry['branches']} branches; "
+            f"{entry['without']} never come to rest again"
+        )
