@@ -32,6 +32,9 @@ HALVINGS = 12
 _GROWTH = 2.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
+#: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
+#: the equations are singular all along (a continuum) halving is of no use.
+_IN_ROW = 8
 
 Arcs = tuple[float, float]
 NO_BOX = Finding(Verdict.UNDECIDED, "no box")
@@ -57,7 +60,7 @@ class Tracer(Strand):
         super().__init__(branch)
         self.until = until
         self.last: Box | Vector | None = None
-        self.count, self.ended, self.length = 0, "", math.inf
+        self.count, self.ended, self.length, self.missed = 0, "", math.inf, 0
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.near = self.nearly_singular(points)
@@ -134,6 +137,7 @@ class Tracer(Strand):
         """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
+        splits = splits and self.missed < _IN_ROW
         if length > _GROWTH * self.length and splits:
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
@@ -152,6 +156,7 @@ class Tracer(Strand):
             if halves is not None:
                 return halves
         self.length = max(self.length, length) if whole else math.inf
+        self.missed = 0 if box is not None else self.missed + 1
         if box is None or piece is None:
             return [self._nothing(arcs, first, last)]
         return [self.linked(piece, box)]
@@ -163,45 +168,52 @@ class Tracer(Strand):
         values: tuple[arb, arb],
         admissible: Finding,
         leaves: bool | None = None,
+        tangential: bool = False,
     ) -> Piece:
         """Return what is proved of a box, but for its link.
 
         Parameters
         ----------
         leaves : whether the branch ends in it on the way to its last point; to its first one if False
+        tangential : whether it ends at a tangential stop, at which the chain is singular
         """
         events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
         inside = tuple(label for label, _, _ in events)
         points: list[Vector | None] = [None, None]
         if leaves is not None:
             points[leaves] = next((zero for _, zero, ends in events if ends), None)
-        folds = 0 if box.monotone else self._count(box, 1, points)
-        flips = 0 if box.no_flip else self._count(box, -1, points)
+        folds = 0 if box.monotone else self._count(box, 1, points, tangential)
+        flips = 0 if box.no_flip else self._count(box, -1, points, tangential)
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = has_no_pair(self.segments, self.build, self.closes, box)
         tori = 0 if off else UNKNOWN
         knots = self.printed(box.first), self.printed(box.last)
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
 
-    def _count(self, box: Box, sigma: int, points: list[Vector | None]) -> int:
+    def _count(
+        self, box: Box, sigma: int, points: list[Vector | None], tangential: bool = False
+    ) -> int:
         """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
 
         Parameters
         ----------
         points : solutions on its curve in the place of its ends, where the branch ends at one
+        tangential : whether that one is the place where it is singular
         """
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
         for end, known in zip((box.first, box.last), points, strict=True):
+            if known and tangential:
+                continue
             at = known or section(self.segments, self.build, box, end)
             if at is None:
                 return UNKNOWN
             _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
             signs.append(arb_mat([row[:-1] for row in rows]).det())
-        if signs[0].contains(0) or signs[1].contains(0):
+        if any(sign.contains(0) for sign in signs):
             return UNKNOWN
-        return int(bool(signs[0] * signs[1] < 0))
+        return int(bool(signs[0] * signs[-1] < 0))
 
     def linked(self, piece: Piece, box: Box) -> Piece:
         """Return a piece with its link to the one before; from now on it is the last one."""
