@@ -28,8 +28,9 @@ from contfric.orbit.system import System
 
 #: Halvings of a step of the branch: what is not proved then is left.
 HALVINGS = 12
-#: A box is tried only if it is at most this much longer than the last one that was proved.
-_GROWTH = 2.5
+#: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
+#: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
+_GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 #: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
@@ -60,7 +61,8 @@ class Tracer(Strand):
         super().__init__(branch)
         self.until = until
         self.last: Box | Vector | None = None
-        self.count, self.ended, self.length, self.missed = 0, "", math.inf, 0
+        self.count, self.ended, self.length = 0, "", math.inf
+        self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.near = self.nearly_singular(points)
@@ -138,7 +140,8 @@ class Tracer(Strand):
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
         splits = splits and self.missed < _IN_ROW
-        if length > _GROWTH * self.length and splits:
+        grows = _GROWTH if self.steady >= _STEADY else _SLOW
+        if length > grows * self.length and splits:
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
@@ -151,11 +154,12 @@ class Tracer(Strand):
             piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
         whole = piece is not None and piece.proved and piece.decided
         if not (whole or refuted) and splits:
-            self.length = length / 2
+            self.length, self.steady = length / 2, 0
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
         self.length = max(self.length, length) if whole else math.inf
+        self.steady = self.steady + 1 if whole else _STEADY
         self.missed = 0 if box is not None else self.missed + 1
         if box is None or piece is None:
             return [self._nothing(arcs, first, last)]
