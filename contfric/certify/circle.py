@@ -21,7 +21,7 @@ from flint import arb_mat
 from contfric.certify.bounds import regular_along
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
-from contfric.certify.multipliers import poincare_map
+from contfric.certify.multipliers import dimension, poincare_map
 from contfric.certify.tube import Box
 from contfric.certify.zeros import Closing, zeros_at_joints
 from contfric.models.balls.numbers import Vector
@@ -49,7 +49,10 @@ def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> b
         return True
     chain = Chain(segments, replace(build(x[-1]), slopes=None))
     known = zeros_at_joints(segments, chain.model, closing)
-    found = poincare_map(chain, chain.joints(x[:-1]), known)
+    joints = chain.joints(x[:-1])
+    if dimension(chain, joints, known) < 2:  # also up to a tangential stop
+        return True
+    found = poincare_map(chain, joints, known)
     return found is not None and no_pair(found)
 
 

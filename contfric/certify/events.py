@@ -281,9 +281,11 @@ def _of_kind(
     event: Bifurcation, location: Location, chain: Chain, z: Vector, touch: Touch | None
 ) -> Finding:
     """Find whether the event is of its kind: at a stop on the limit of rest, by the rate of the load."""
-    if touch is None or touch.condition.rate or touch.condition.within or event.kind is Kind.T:
+    if touch is None or event.kind is Kind.T:
         return Finding(Verdict.PROVED)
     condition = touch.condition
+    if condition.rate or condition.within or condition.departs:
+        return Finding(Verdict.PROVED)
     test = Test(Margin.JOINT, condition.segment, condition.surface)
     resting = resting_domain(location.orbit.system, test)
     if resting is None:

@@ -45,12 +45,15 @@ class Condition:
     surface : the surface whose observable is meant
     rate : whether the rate of the observable along the segment is meant, at its end
     within : whether it is touched inside of the segment; else it is met at its end
+    departs : mode along which the rate of the observable is meant in the place of it: the acceleration with
+        which a hold would be left, or the rate of the load where rest begins; empty for the observable
     """
 
     segment: int
     surface: str
     rate: bool = False
     within: bool = False
+    departs: str = ""
 
 
 def rows_of(
@@ -58,9 +61,9 @@ def rows_of(
 ) -> tuple[arb_mat, arb_mat]:
     """Return the row of a condition's observable or of its derivative, and its slope by the parameter."""
     assert model.slopes is not None
-    mode = segments.modes[condition.segment]
     row, slope = model.surfaces[condition.surface], model.slopes.surfaces[condition.surface]
-    for _ in range(order):
+    modes = [segments.modes[condition.segment]] * order
+    for mode in [condition.departs, *modes] if condition.departs else modes:
         slope = slope * model.fields[mode] + row * model.slopes.fields[mode]
         row = row * model.fields[mode]
     return row, slope

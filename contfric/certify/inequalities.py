@@ -131,7 +131,7 @@ def inequalities(
                 finding = positive(path, row, order, ends, bends)
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
-        yield from _held(chain, system, i, path, zeros)
+        yield from _held(chain, system, i, path, zeros, touch)
     for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
@@ -140,6 +140,8 @@ def inequalities(
 def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
     """Tell whether the event is that a segment touches a surface."""
     if touch is None or not (touch.condition.rate or touch.condition.within):
+        return False
+    if touch.condition.departs:
         return False
     return (touch.condition.segment, touch.condition.surface) == (i, surface)
 
@@ -155,6 +157,8 @@ def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[
     if touch is None or touch.condition.within:
         return {}
     met = touch.condition
+    if met.departs:
+        return {met.segment: [model.rate(met.surface, met.departs)]}
     if not met.rate:
         return {met.segment: [model.rows[met.surface]]}
     return {met.segment: [model.rate(met.surface, modes[met.segment])]}
@@ -163,7 +167,7 @@ def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[
 def _is_of(met: Condition, found: Inequality) -> bool:
     """Tell whether an inequality at a joint is the one that vanishes at an event."""
     what = EXIT if met.rate else JOINT
-    return not met.within and (met.segment, met.surface, what) == (
+    return not (met.within or met.departs) and (met.segment, met.surface, what) == (
         found.segment,
         found.surface,
         found.what,
@@ -171,7 +175,7 @@ def _is_of(met: Condition, found: Inequality) -> bool:
 
 
 def _held(
-    chain: Chain, system: System, i: int, path: Path, zeros: list[Vector]
+    chain: Chain, system: System, i: int, path: Path, zeros: list[Vector], touch: Touch | None
 ) -> Iterator[Inequality]:
     """Return that a hold could be left at any time: the acceleration that it would be left with."""
     for hold in system.holds:
@@ -179,8 +183,15 @@ def _held(
             sign = int(system.layout.exit_signs[i])
             row = chain.model.rate(hold.leaves, hold.departs)
             order = order_at_start(chain.model, row, chain.segments.modes[i], zeros)
-            finding = positive(path, arb_mat([row]) * sign, order, False)
+            if touch and touch.after is not None and _departs(touch, i):
+                finding = touched(path, arb_mat([row]) * sign, order, touch.after)
+            else:
+                finding = positive(path, arb_mat([row]) * sign, order, False)
             yield Inequality(i, hold.leaves, "acceleration", finding)
+
+
+def _departs(touch: Touch, i: int) -> bool:
+    return bool(touch.condition.departs) and touch.condition.segment == i
 
 
 def _stays(row: arb_mat, field: arb_mat) -> bool:

@@ -9,6 +9,7 @@ from flint import arb
 
 from contfric.certify.circle import is_off
 from contfric.certify.ending import Edge, ends_inside
+from contfric.certify.inequalities import EXIT
 from contfric.certify.passing import dot
 from contfric.certify.piece import UNKNOWN, Piece
 from contfric.certify.splitting import Split, event_of, has_no_flip, split_box
@@ -134,7 +135,8 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
     names = ends_inside(Edge(tracer.system, segments, build, tracer.closes, forward), box)
     if not names:
         return None
-    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), forward)
+    tangential = any(name.what == EXIT and tracer.is_tangential(name.segment) for name in names)
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), forward, tangential)
     if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)

@@ -10,18 +10,27 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from flint import arb, arb_mat
 
 from contfric.certify.extended import Condition
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.errors import ContfricError
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.numbers import column
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.holds import Hold, Itinerary
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.margins import Margin, Test
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import build_system
+from contfric.signature.holds import hold_at, is_hold
 
 #: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.
 _VANISHED = 1e-7
+#: A touch of the limit by a hold that starts on it is at its start if it is no later.
+_AT_START = 1e-5
+#: Times in a hold at which the acceleration is looked at: Newton's method goes on from the least one.
+_TIMES = 500
 
 
 class NotLocatedError(ContfricError):
@@ -65,36 +74,91 @@ def location_of(event: Bifurcation) -> Location:
         return _tangency(orbit, test)
     if test.margin is Margin.JOINT:
         return Location(orbit, Condition(test.segment, test.surface))
+    if test.margin is Margin.EXIT and orbit.system.itinerary[test.segment][1] != test.surface:
+        return Location(orbit, _at_stop(orbit, test.segment, test.surface))
     if test.margin is Margin.EXIT:
         return Location(orbit, Condition(test.segment, test.surface, rate=True))
+    if test.margin is Margin.HELD:
+        hold = next(h for h in orbit.system.holds if h.segment == test.segment)
+        condition = Condition(test.segment, test.surface, within=True, departs=hold.departs)
+        return Location(orbit, condition, _least_acceleration(orbit, hold))
     if test.margin is Margin.INTERIOR:
         _, after = _nearest_touch(orbit, test.segment, test.surface)
+        pinned = [h.segment for h in orbit.system.holds if h.pin == test.surface]
+        if test.segment in pinned and after < _AT_START:  # the load no longer falls at its stop
+            return Location(orbit, _at_stop(orbit, test.segment - 1, test.surface))
         return Location(orbit, Condition(test.segment, test.surface, within=True), after)
     raise NotLocatedError(f"events of a margin of the kind '{test.margin.value}' are not proved")
 
 
 def _released(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, tuple[Test, ...]]:
-    """Return an orbit whose hold ends where it would be released anyway, as the regular orbit that it is.
+    """Return an orbit at the end of its holds as one without them, and what vanishes on that one.
 
-    A hold that is pinned to the limit of rest and is left on it again: a bridge ends there. What is left
-    of it is that the stop before lies on the limit. Other holds stay what they are.
+    A hold that ends on a limit of rest is released there anyway: it is a stick. One that is left without
+    acceleration goes on as the rest that follows. One without length is none, and the stick before it is left
+    where the load is stationary. What is left of the others is that their pin is met. Where the stick up to a
+    touch of its limit vanishes, the hold after it starts at a stop on the limit, the load being stationary.
     """
-    itinerary, moved = list(orbit.system.itinerary), []
-    for test in tests:
-        hold = next((h for h in orbit.system.holds if h.segment == test.segment), None)
+    system, (first, last) = orbit.system, (0, 0)
+    for k, test in enumerate(tests):
+        hold = next((h for h in system.holds if _ends(test, h)), None)
         if hold is None:
-            moved.append(test)
-        elif hold.pin == test.surface and test.margin is Margin.JOINT:
-            itinerary[hold.segment] = (itinerary[hold.segment][0], test.surface)
-            moved.append(Test(Margin.JOINT, hold.segment - 1, test.surface))
+            continue
+        i, rest = hold.segment, system.itinerary[hold.segment][0]
+        if test.margin is Margin.LASTING:
+            limit = system.itinerary[i - 1][1]
+            vanished = test.segment == i  # the hold itself; else the stick before it
+            exit_ = limit if vanished else hold_at(limit)
+            moved, (first, last) = Test(Margin.EXIT, i - 2 + vanished, limit), (i - 1, i)
         else:
-            raise NotLocatedError(
-                "a hold that ends in another way than by its release is not proved"
-            )
-    if tuple(itinerary) == orbit.system.itinerary:
-        return orbit, tests
-    system = build_system(orbit.model, tuple(itinerary), orbit.system.periods, orbit.system.half)
-    return replace(orbit, system=system), tuple(moved)
+            exit_ = _end_of(orbit, hold, test)
+            moved = Test(Margin.HELD, i, hold.leaves) if is_hold(exit_) else _pinned(orbit, hold)
+            merged = hold.after_rest and not is_hold(exit_)  # one stick, which touches its limit
+            first, last = i - merged, i + 2 * (test.margin is Margin.EXIT)
+        if moved.segment < 0:
+            raise NotLocatedError("a hold that ends after the first stick is not proved")
+        kept = [j for j in range(len(orbit.joints)) if not first < j <= last]
+        itinerary = [system.itinerary[j] for j in kept]
+        itinerary[first] = (rest, exit_)
+        new = build_system(orbit.model, tuple(itinerary), system.periods, system.half)
+        others = [t for t in tests[:k] + tests[k + 1 :] if not first <= t.segment <= last]
+        left = [replace(t, segment=t.segment - (last - first) * (t.segment > last)) for t in others]
+        return _released(replace(orbit, system=new, joints=orbit.joints[kept]), (moved, *left))
+    return orbit, tests
+
+
+def _at_stop(orbit: Orbit, segment: int, surface: str) -> Condition:
+    """Return that an observable is stationary where the rest after a segment begins."""
+    after = orbit.system.itinerary[(segment + 1) % len(orbit.system.itinerary)][0]
+    return Condition(segment, surface, departs=after)
+
+
+def _ends(test: Test, hold: Hold) -> bool:
+    """Tell whether a hold is no longer one where a margin vanishes."""
+    if test.margin is Margin.LASTING:
+        return hold.after_rest and hold.segment - test.segment in (0, 1)
+    return test.segment == hold.segment and test.margin in (Margin.JOINT, Margin.EXIT)
+
+
+def _end_of(orbit: Orbit, hold: Hold, test: Test) -> str:
+    """Return the exit of the rest that a hold is at the event."""
+    itinerary, i = orbit.system.itinerary, hold.segment
+    if test.margin is Margin.JOINT:
+        return test.surface
+    lasts = orbit.ends[i + 1 : i + 2, 0] - orbit.begins[i + 1 : i + 2, 0]
+    if i + 2 < len(itinerary) and itinerary[i + 2][0] == itinerary[i][0] and lasts[0] < _VANISHED:
+        return itinerary[i + 2][1]
+    raise NotLocatedError("a hold that is left without acceleration into a slide is not proved")
+
+
+def _pinned(orbit: Orbit, hold: Hold) -> Test:
+    """Return the pin of a hold as a condition on the segment before it."""
+    before = hold.segment - 1
+    if hold.pin is not None:
+        return Test(Margin.JOINT, before, hold.pin)
+    if hold.after_rest:
+        return Test(Margin.INTERIOR, before, orbit.system.itinerary[before][1])
+    return Test(Margin.EXIT, before, hold.leaves)
 
 
 def _multiplier_orbit(event: Bifurcation) -> Orbit:
@@ -117,6 +181,17 @@ def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]
     kept = [i for i, duration in enumerate(lasts) if duration > _VANISHED]
     itinerary = tuple(whole.itinerary[i] for i in kept)
     joints = whole.cycle[kept]
+    times = _repeats(itinerary, joints, whole)
+    if times > 1:
+        count, periods = len(kept) // times, whole.periods // times
+        itinerary, joints = itinerary[:count], joints[:count]
+        tests = tuple(
+            replace(t, segment=kept[kept.index(t.segment) % count])
+            for t in tests
+            if t.segment in kept
+        )
+        short = build_system(model, itinerary, periods)
+        whole, kept = replace(whole, system=short, joints=joints), kept[:count]
     half = half_of(model, itinerary, whole.periods)
     if half is not None and _is_symmetric(model, joints, whole.period):
         itinerary, joints = half, joints[: len(half)]
@@ -138,6 +213,23 @@ def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]
         if moved not in found:
             found.append(moved)
     return replace(whole, system=system, joints=joints.copy()), found
+
+
+def _repeats(itinerary: Itinerary, joints: FloatArray, orbit: Orbit) -> int:
+    """Return how often an orbit of some joints repeats itself within its period."""
+    for times in range(orbit.periods, 1, -1):
+        count = len(itinerary) // times
+        if (
+            orbit.periods % times
+            or len(itinerary) % times
+            or itinerary[count:] != itinerary[:-count]
+        ):
+            continue
+        off = joints[count:] - joints[:-count]
+        off[:, 0] -= orbit.period / times
+        if np.max(np.abs(off)) < _VANISHED:
+            return times
+    return 1
 
 
 def _is_symmetric(model: Model, joints: FloatArray, period: float) -> bool:
@@ -180,3 +272,17 @@ def _nearest_touch(orbit: Orbit, segment: int, surface: str) -> tuple[float, flo
         return float("inf"), 0.0
     k = int(np.argmin(gaps))
     return float(gaps[k]), float(times[k])
+
+
+def _least_acceleration(orbit: Orbit, hold: Hold) -> float:
+    """Return when in a hold the acceleration with which it would be left comes nearest to zero inside."""
+    start = orbit.begins[hold.segment]
+    balls, mode = ball_model(orbit.model, orbit.params), orbit.system.itinerary[hold.segment][0]
+    state = column(balls.extended(arb(float(start[0])), [arb(float(y)) for y in start[1:]]))
+    row = arb_mat([balls.rate(hold.leaves, hold.departs)])
+    step = (float(orbit.ends[hold.segment, 0]) - float(start[0])) / _TIMES
+    flow, sizes = (balls.fields[mode] * step).exp().mid(), []
+    for _ in range(_TIMES - 1):
+        state = (flow * state).mid()
+        sizes.append(abs(float((row * state)[0, 0].mid())))
+    return step * (1 + int(np.argmin(sizes)))

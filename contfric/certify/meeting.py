@@ -109,8 +109,8 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
 
 
 def _row(condition: Condition, segments: Segments, model: BallModel) -> Vector:
-    if condition.rate:
-        return model.rate(condition.surface, segments.modes[condition.segment])
+    if condition.rate or condition.departs:
+        return model.rate(condition.surface, condition.departs or segments.modes[condition.segment])
     return model.rows[condition.surface]
 
 

@@ -36,7 +36,7 @@ def poincare_map(chain: Chain, joints: list[Vector], known: list[list[Vector]]) 
     known : rows that vanish at each joint
     """
     count = chain.segments.count
-    at = max(range(count), key=lambda i: len(known[i]))
+    at, rows = _most_known(chain, joints, known)
     steps = [_step(chain, joints, i) for i in range(count)]
     total: arb_mat | None = None
     for i in [*range(at, count), -1, *range(at)]:
@@ -45,16 +45,28 @@ def poincare_map(chain: Chain, joints: list[Vector], known: list[list[Vector]]) 
             return None
         total = step if total is None else step * total
     assert total is not None
-    rows = []
-    t = joints[at][0]
-    for row in known[at]:
-        by_time = (arb_mat([row]) * column(chain.model.by_time(t, 1)))[0, 0]
-        rows.append([by_time, *row[: chain.n]])
     if chain.segments.turn == 0.0:
         m = chain.m
         total = arb_mat([[total[a, b] for b in range(1, m)] for a in range(1, m)])
-        rows = [row[1:] for row in rows]
     return _restricted(total, rows)
+
+
+def _most_known(
+    chain: Chain, joints: list[Vector], known: list[list[Vector]]
+) -> tuple[int, list[Vector]]:
+    """Return the joint with the most vanishing rows, and these by its coordinates."""
+    at = max(range(chain.segments.count), key=lambda i: len(known[i]))
+    rows = []
+    for row in known[at]:
+        by_time = (arb_mat([row]) * column(chain.model.by_time(joints[at][0], 1)))[0, 0]
+        rows.append([by_time, *row[: chain.n]])
+    return at, rows if chain.segments.turn != 0.0 else [row[1:] for row in rows]
+
+
+def dimension(chain: Chain, joints: list[Vector], known: list[list[Vector]]) -> int:
+    """Return the dimension of the Poincare map, which a tangential exit does not change."""
+    _, rows = _most_known(chain, joints, known)
+    return len(_coordinates(chain.m - (chain.segments.turn == 0.0), rows)[0])
 
 
 def _step(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
@@ -85,15 +97,12 @@ def _closed_back(chain: Chain) -> arb_mat:
     return arb_mat([*rows, *([arb(0), *(back[a, b] for b in range(n))] for a in range(n))])
 
 
-def _restricted(matrix: arb_mat, rows: list[Vector]) -> arb_mat:
-    """Return a map on the space where some rows vanish, in the coordinates that they leave free.
+def _coordinates(size: int, rows: list[Vector]) -> tuple[list[int], dict[int, Vector]]:
+    """Return the coordinates that some vanishing rows leave free, and all coordinates by these.
 
     A row that cannot be told from a combination of others is not used.
     """
-    size = matrix.nrows()
-    basis = {
-        k: [arb(int(k == j)) for j in range(size)] for k in range(size)
-    }  # coordinates by free ones
+    basis = {k: [arb(int(k == j)) for j in range(size)] for k in range(size)}
     free = list(range(size))
     for row in rows:
         factors = {f: sum((row[k] * basis[k][f] for k in range(size)), arb(0)) for f in free}
@@ -106,6 +115,13 @@ def _restricted(matrix: arb_mat, rows: list[Vector]) -> arb_mat:
             for f in free:
                 basis[k][f] -= share * factors[f]
             basis[k][pivot] = arb(0)
+    return free, basis
+
+
+def _restricted(matrix: arb_mat, rows: list[Vector]) -> arb_mat:
+    """Return a map on the space where some rows vanish, in the coordinates that they leave free."""
+    size = matrix.nrows()
+    free, basis = _coordinates(size, rows)
     if not free:
         return arb_mat(0, 0)
     image = matrix * arb_mat([[basis[k][f] for f in free] for k in range(size)])

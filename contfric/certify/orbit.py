@@ -39,6 +39,7 @@ _WIDE = 5
 _SPARE = 30
 #: Least share of the box that is tried where the Jacobian changes too much over it.
 _SMALLEST = 16
+_FAMILY = "it is one of a family of orbits: what a contact that never slips keeps is free"
 
 
 def certify_orbit(orbit: Orbit) -> Certificate:
@@ -98,7 +99,7 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
     printed = [arb(float(x)) for x in orbit.joints.ravel()]
     inverse = approximate_inverse(equations(printed)[1])
     if inverse is None:
-        return _nothing(orbit, "the equations are singular at the printed joints", bits)
+        return _nothing(orbit, _singular(orbit, "at the printed joints"), bits)
     radii = [_WIDE * e for e in stated_error(orbit, inverse)]
     box = krawczyk(equations, printed, radii, inverse)
     if box.verdict is Verdict.REFUTED:
@@ -107,7 +108,7 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
         )
     thin = enclosed(equations, printed, arb(2) ** (_SPARE - bits))
     if thin.verdict is not Verdict.PROVED:
-        return _nothing(orbit, "the equations are singular to working precision", bits)
+        return _nothing(orbit, _singular(orbit, "to working precision"), bits)
     inside = all(abs(x - p) < r for x, p, r in zip(thin.zero, printed, radii, strict=True))
     exists = Finding(Verdict.PROVED)
     if not inside:
@@ -118,6 +119,10 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
             Verdict.UNDECIDED, "the equations are nearly singular over the stated error"
         )
     return _with_solution(orbit, segments, model, thin, exists, unique, radii, bits)
+
+
+def _singular(orbit: Orbit, where: str) -> str:
+    return _FAMILY if len(orbit.system.layout.conserved) else f"the equations are singular {where}"
 
 
 def _with_solution(

@@ -15,6 +15,7 @@ from contfric.certify.events import EventCertificate
 from contfric.certify.extended import Builder
 from contfric.certify.meeting import as_zero_of
 from contfric.certify.phases import in_phases
+from contfric.certify.zeros import in_span
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL
 from contfric.models.balls.build import ball_model
@@ -113,6 +114,31 @@ class Strand:
             joints = [x * scale if i % m == 0 else x for i, x in enumerate(point.enclosure)]
             found[k] = [*joints, value]
         return found
+
+    def is_tangential(self, i: int) -> bool:
+        """Tell whether the chain is singular where the exit of a segment is tangential, by its equations.
+
+        It is where the next mode moves on as this one: then the time of the exit has no part in any
+        equation. The difference of the two fields is to be a combination of the observable and its rate,
+        which vanish there. Where all matrices are affine in the parameter the minors that say so are of
+        degree four at most: they vanish if they do at five values.
+        """
+        modes = [mode for mode, _ in self.orbit.itinerary]
+        mode, after, exit_ = modes[i], modes[(i + 1) % len(modes)], self.segments.exits[i]
+        low, high = float(self.branch.values.min()), float(self.branch.values.max())
+        slopes = self._model(arb(low).union(arb(high))).slopes
+        if slopes is None or not exit_ or any(self.segments.resets) or not low < high:
+            return False
+        matrices = (slopes.fields[mode], slopes.fields[after], slopes.surfaces[exit_])
+        if not all(x.is_exact() for matrix in matrices for x in matrix.entries()):
+            return False
+        for value in np.linspace(low, high, 5):
+            model = self._model(arb(float(value)))
+            known = [model.rows[exit_], model.rate(exit_, mode)]
+            change = (model.fields[mode] - model.fields[after]).tolist()
+            if not all(in_span(row, known) for row in change[: model.states]):
+                return False
+        return True
 
     def end_of(self, forward: bool) -> tuple[float, float]:
         """Return arclength and parameter at an end of the branch."""

@@ -28,10 +28,14 @@ from contfric.orbit.system import System
 
 #: Halvings of a step of the branch: what is not proved then is left.
 HALVINGS = 12
-#: A box is tried only if it is at most this much longer than the last one that was proved.
-_GROWTH = 2.5
+#: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
+#: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
+_GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
+#: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
+#: the equations are singular all along (a continuum) halving is of no use.
+_IN_ROW = 8
 
 Arcs = tuple[float, float]
 NO_BOX = Finding(Verdict.UNDECIDED, "no box")
@@ -58,6 +62,7 @@ class Tracer(Strand):
         self.until = until
         self.last: Box | Vector | None = None
         self.count, self.ended, self.length = 0, "", math.inf
+        self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.near = self.nearly_singular(points)
@@ -134,7 +139,9 @@ class Tracer(Strand):
         """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
-        if length > _GROWTH * self.length and splits:
+        splits = splits and self.missed < _IN_ROW
+        grows = _GROWTH if self.steady >= _STEADY else _SLOW
+        if length > grows * self.length and splits:
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
@@ -147,11 +154,13 @@ class Tracer(Strand):
             piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
         whole = piece is not None and piece.proved and piece.decided
         if not (whole or refuted) and splits:
-            self.length = length / 2
+            self.length, self.steady = length / 2, 0
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
         self.length = max(self.length, length) if whole else math.inf
+        self.steady = self.steady + 1 if whole else _STEADY
+        self.missed = 0 if box is not None else self.missed + 1
         if box is None or piece is None:
             return [self._nothing(arcs, first, last)]
         return [self.linked(piece, box)]
@@ -163,45 +172,52 @@ class Tracer(Strand):
         values: tuple[arb, arb],
         admissible: Finding,
         leaves: bool | None = None,
+        tangential: bool = False,
     ) -> Piece:
         """Return what is proved of a box, but for its link.
 
         Parameters
         ----------
         leaves : whether the branch ends in it on the way to its last point; to its first one if False
+        tangential : whether it ends at a tangential stop, at which the chain is singular
         """
         events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
         inside = tuple(label for label, _, _ in events)
         points: list[Vector | None] = [None, None]
         if leaves is not None:
             points[leaves] = next((zero for _, zero, ends in events if ends), None)
-        folds = 0 if box.monotone else self._count(box, 1, points)
-        flips = 0 if box.no_flip else self._count(box, -1, points)
+        folds = 0 if box.monotone else self._count(box, 1, points, tangential)
+        flips = 0 if box.no_flip else self._count(box, -1, points, tangential)
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = has_no_pair(self.segments, self.build, self.closes, box)
         tori = 0 if off else UNKNOWN
         knots = self.printed(box.first), self.printed(box.last)
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
 
-    def _count(self, box: Box, sigma: int, points: list[Vector | None]) -> int:
+    def _count(
+        self, box: Box, sigma: int, points: list[Vector | None], tangential: bool = False
+    ) -> int:
         """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
 
         Parameters
         ----------
         points : solutions on its curve in the place of its ends, where the branch ends at one
+        tangential : whether that one is the place where it is singular
         """
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
         for end, known in zip((box.first, box.last), points, strict=True):
+            if known and tangential:
+                continue
             at = known or section(self.segments, self.build, box, end)
             if at is None:
                 return UNKNOWN
             _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
             signs.append(arb_mat([row[:-1] for row in rows]).det())
-        if signs[0].contains(0) or signs[1].contains(0):
+        if any(sign.contains(0) for sign in signs):
             return UNKNOWN
-        return int(bool(signs[0] * signs[1] < 0))
+        return int(bool(signs[0] * signs[-1] < 0))
 
     def linked(self, piece: Piece, box: Box) -> Piece:
         """Return a piece with its link to the one before; from now on it is the last one."""

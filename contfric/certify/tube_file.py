@@ -50,6 +50,8 @@ _CRITICAL = 0.01
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
 #: distance from there.
 _BORN = 0.02
+#: Up to which share of the box of an end that the checker does not know a tube is written: before the event.
+_BEFORE = 0.8
 #: What is in a file and not looked at, for a reader of it.
 _UNCHECKED = "what lies between an open end (null) and the event at which the branch ends"
 
@@ -225,7 +227,11 @@ def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
 
 def _from_end(proof: BranchCertificate, row: _Row, before: _Row, until: float) -> _Run | None:
     """Return the tube from an end of the branch before a knot to another knot, if one is decided."""
-    for end in _ends(proof, proof.pieces[0]):
+    ends = _ends(proof, proof.pieces[0])
+    if not ends:
+        run = _Run(_data(proof), _between(row, before, _BEFORE), until)
+        return run if run.march(row) else None
+    for end in ends:
         run = _Run(_data(proof), row, until)
         if run.finish(before, end):
             run.ends[1] = end
@@ -240,17 +246,23 @@ def _on(proof: BranchCertificate, k: int, run: _Run, row: _Row) -> None:
     if not piece.ends:
         run.march(row)
     elif k == len(proof.pieces) - 1:
-        for end in _ends(proof, piece):
+        ends = _ends(proof, piece)
+        if not ends:
+            run.march(_between(run.rows[-1], row, _BEFORE))
+        for end in ends:
             if run.finish(row, end):
                 run.ends[1] = end
                 break
 
 
 def _ends(proof: BranchCertificate, piece: Piece) -> list[list[Any]]:
-    """Return kind and places of the events at which the branch may end in a box."""
+    """Return kind and places of the events at which the branch may end in a box: those that are checked."""
     terminal = {end.value for end in TERMINAL}
     labels = [label for label in piece.events if label.split("_")[0] in terminal]
-    return [[label.split("_")[0], _places(proof, piece, label)] for label in labels]
+    ends: list[list[Any]] = [
+        [label.split("_")[0], _places(proof, piece, label)] for label in labels
+    ]
+    return [end for end in ends if end[1]]
 
 
 def _places(proof: BranchCertificate, piece: Piece, label: str) -> list[list[Any]]:

@@ -146,6 +146,33 @@ def test_every_event_of_a_diagram_is_proved() -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "free", "span", "params", "expected"),
+    [
+        ("2a-14seg", "S", (0.005, 0.0665), {"S": 0.06}, {"held", "exit", "joint"}),
+        ("", "h", (-0.3, 0.3), {"S": 0.3}, {"interior", "lasting"}),
+    ],
+)
+def test_events_at_which_holds_end_are_proved(
+    name: str, free: str, span: tuple[float, float], params: dict[str, float], expected: set[str]
+) -> None:
+    """Released on a limit, left without acceleration, split, without length, or pinned elsewhere."""
+    params = {"Omega": 0.5, "S0": 0.4, **params}
+    orbit = cf.solve_orbit("coulomb", name, params) if name else cf.find_orbit("coulomb", params)
+    margins = set()
+    for event in cf.explore(orbit, free, span).bifurcations:
+        certificate = event.certify(free)
+        if not certificate.proved:  # at h = -1/27 the load stands still at its stop
+            assert "the load moves outward" in certificate.why, certificate
+            continue
+        assert certificate.radius < 1e-30
+        assert certificate.error < 1e-13
+        ends = {hold.segment for hold in event.orbit.system.holds}
+        ends |= {hold.segment - 1 for hold in event.orbit.system.holds if hold.after_rest}
+        margins |= {test.margin.value for test in event.tests if test.segment in ends}
+    assert margins >= expected, margins
+
+
+@pytest.mark.parametrize(
     ("scene", "kind"), [(("Omega", 0.4, 0.6), Kind.BP), (("S", 0.06, 0.39), Kind.PD)]
 )
 def test_a_multiplier_is_minus_one_in_60_digits(scene: Any, kind: Kind) -> None:

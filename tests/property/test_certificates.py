@@ -108,6 +108,23 @@ def test_a_continuum_is_undecided() -> None:
     assert Verdict.UNDECIDED in {found.exists.verdict, found.unique.verdict, found.stable.verdict}
 
 
+def test_an_orbit_with_a_contact_that_never_slips_is_said_to_be_one_of_a_family() -> None:
+    spring = {"kind": "jenkins", "displacement": "q1", "stiffness": "1.5", "limit": "5.0"}
+    model = cf.Mechanism(
+        np.eye(2),
+        0.2 * np.eye(2),
+        np.array([[2.0, -1.0], [-1.0, 2.0]]),
+        contacts={"a": spring},
+        force={"q1": "F*cos(W*t)"},
+        parameters={"W": 0.8, "F": 0.3},
+        period="2*pi/W",
+        name="never-slips",
+    )
+    found = cf.find_orbit(model, {"F": 0.3}).certify()
+    assert not found.proved
+    assert "one of a family" in found.why
+
+
 # ---------------------------------------------------------------------------------- signs
 
 

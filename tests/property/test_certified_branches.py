@@ -255,3 +255,31 @@ def test_what_vanishes_identically_in_the_parameters_is_known_along_a_branch(
     span = (value * (1 - 1e-3), value * (1 + 1e-3))
     proof = cf.continue_orbit(orbit, parameter, span).certify()
     assert proof.complete, (proof.gaps, proof.open)
+
+
+def test_a_tube_ends_at_a_tangential_stop() -> None:
+    """Where a stop becomes tangential the chain is singular, and the parameter turns on its curve."""
+    orbit = cf.solve_orbit("coulomb", "1a-9seg", {"Omega": 0.5, "S": 0.04, "S0": 0.4})
+    found = cf.continue_orbit(orbit, "S", (0.03, 0.05)).certify()
+    ends = {name.what for piece in found.pieces for name in piece.ends}
+    assert "exit" in ends
+    assert found.complete, (found.gaps, found.open)
+    assert sum(piece.folds for piece in found.pieces) == 1  # that at 0.0356, and not the end
+    tracer = Tracer(found.branch, list(found.proofs), np.inf)
+    stops = [i for i, mode in enumerate(tracer.segments.modes) if mode != "stick"]
+    after = [tracer.segments.modes[(i + 1) % tracer.segments.count] for i in stops]
+    # not where the next slide has another acceleration: then the chain is regular at a tangential stop
+    assert [tracer.is_tangential(i) for i in stops] == [mode == "stick" for mode in after]
+    assert "stick" in after and len(set(after)) > 1
+
+
+def test_where_equations_are_singular_all_along_few_boxes_are_tried() -> None:
+    """A continuum of orbits at one value of the parameter, of second order: no box is to be had."""
+    diagram = cf.explore(
+        cf.find_orbit("coulomb", {"Omega": 0.52, "S": 0.22, "S0": 0.3}), "Omega", (0.49, 0.54)
+    )
+    (branch,) = (b for b in diagram.branches if np.ptp(b.values) < 1e-9 and not b.mirrored)
+    tracer = Tracer(branch, [], np.inf)
+    pieces = [piece for k in range(len(branch) - 1) for piece in tracer.step(k)]
+    assert tracer.ended == "" and not any(piece.proved for piece in pieces)
+    assert tracer.count < 40 * len(branch)
