@@ -19,7 +19,7 @@ from contfric.orbit.rest import check_rest, comes_to_rest, is_point
 from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
-from contfric.orbit.solve import settle
+from contfric.orbit.solve import centred, settle
 from contfric.orbit.system import build_system
 from contfric.orbit.time_scale import time_scale
 from contfric.remember.journal import remembered
@@ -212,7 +212,9 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
             return solved
         if mismatch <= _EXACT and not solved.converged:
             # the simulation repeats itself but the system is singular: one orbit of a continuum
-            return Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
+            return centred(
+                Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
+            )
     return None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray
 from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
+from contfric.orbit.conserved import conserved
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import has_sections, named_by_ends
@@ -30,6 +32,8 @@ TRUST = 0.3
 #: Units of time that a stretch of an autonomous model may take: far more than a cycle, and few enough
 #: where it converges.
 _LONGEST = 300.0
+#: States that differ by this (relative to 1 + the largest) are the same: two solutions by Newton's method.
+_SAME = 1e-8
 #: Candidates of the smallest mismatch that are handed to Newton.
 CANDIDATES = 40
 
@@ -222,3 +226,30 @@ def settle(orbit: Orbit) -> Orbit:
         return solved
     half = solved.as_half()
     return solved if half is solved else refine(half)
+
+
+def centred(orbit: Orbit) -> Orbit:
+    """Return an orbit on its half, moved to where it is symmetric, if a constant does that; else as it is.
+
+    Masses that nothing holds may oscillate anywhere: orbits are a continuum in which each is another one
+    moved by a constant, and one of them is its own image. The symmetry R takes a place d of it to -d, so that
+    ``y(t + T/2) - R y(t)`` is 2 d all along. Where a contact rests that never slips is a datum, and stays.
+    """
+    if not np.isfinite(orbit.mirror_distance) or len(conserved(orbit.model, orbit.itinerary)):
+        return orbit
+    assert orbit.model.symmetry is not None
+    n, states = len(orbit.joints) // 2, orbit.joints[:, 1:]
+    turned = orbit.model.symmetry.array()
+    twice = states[n:] - states[:n] @ turned.T
+    offset = 0.5 * np.mean(twice, axis=0)
+    small = _SAME * (1.0 + float(np.max(np.abs(states))))
+    if max(np.ptp(twice, axis=0).max(), np.max(np.abs(turned @ offset + offset))) > small:
+        return orbit
+    joints = orbit.joints.copy()
+    joints[:, 1:] -= offset
+    half = replace(orbit, joints=joints).as_half()
+    if not half.system.half:
+        return orbit
+    found = refine(half)
+    moved = float(np.max(np.abs(found.joints - half.joints)))
+    return found if found.converged and found.admissible and moved < small else orbit

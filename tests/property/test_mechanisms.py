@@ -565,3 +565,27 @@ def test_sparse_matrices_are_matrices(tmp_path: Path) -> None:
     typed = cf.Mechanism(np.eye(2), [0.05, 0.05], csr_matrix(stiffness), period="2*pi", **own)
     orbits = [cf.find_orbit(model) for model in (typed, cf.load_model(file))]
     assert np.max(np.abs(orbits[0].joints - orbits[1].joints)) < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_masses_that_nothing_holds_are_found_where_they_are_symmetric(seed: int) -> None:
+    """Their orbits are a continuum, moved by a constant: the symmetric one alone has a continuation."""
+    draw = np.random.default_rng([61, seed])
+    stiffness = draw.uniform(0.8, 1.2) * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    rubs = {
+        name: RUBS | {"velocity": v, "kinetic": f"{draw.uniform(0.5, 1.0):.3f}*S"}
+        for name, v in (("a", "v1"), ("b", "v2"))
+    }
+    model = cf.Mechanism(
+        np.diag(draw.uniform(0.8, 1.5, 2)),
+        0.05 * stiffness,
+        stiffness,
+        contacts=rubs,
+        force={"q1": "F*cos(W*t)"},
+        parameters={"W": 0.7, "S": 0.15, "F": 1.0},
+        period="2*pi/W",
+    )
+    orbit = cf.find_orbit(model)
+    assert orbit.symmetric and orbit.admissible and orbit.residual < 1e-12
+    branch = cf.continue_orbit(orbit, "F", (0.9, 1.1))
+    assert {end.reason.name for end in branch.ends} <= {"RANGE", "CS", "SS", "AS", "GS"}
