@@ -140,7 +140,11 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
 
 
 def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[dict[str, Any]]:
-    """Return those certificates that are proved and that the checker knows, as plain data."""
+    """Return those certificates that are proved and that the checker knows, as plain data.
+
+    An event that the checker does not verify is left out: where two happen at once (an SS at which a
+    multiplier is -1, too) a file of one would be refused with all that stands next to it.
+    """
     from contfric.certify.certificate import Certificate
 
     found = []
@@ -149,9 +153,11 @@ def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[d
             continue
         try:
             data = certificate_data if isinstance(proof, Certificate) else event_data
-            found.append(data(proof))  # type: ignore[arg-type] # each has its own
+            part = data(proof)  # type: ignore[arg-type] # each has its own
         except ParameterError:  # none of those that it knows
             continue
+        if part["certificate"] != "event" or check_text(json.dumps(part)).yes:
+            found.append(part)
     return found
 
 

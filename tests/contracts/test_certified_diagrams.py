@@ -13,6 +13,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
+from contfric.certify import files
 from contfric.certify.diagram_certificate import (
     DiagramCertificate,
     Gap,
@@ -133,3 +134,16 @@ def test_what_is_no_run_folder_is_said(
     said = capsys.readouterr().err
     assert "holds no diagram" in said
     assert "pip install 'contfric[certify]'" in said
+
+
+def test_an_event_that_the_checker_refuses_is_not_in_the_file(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where two events happen at once a file of one would be refused, and all that stands next to it."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
+    (event, *_) = cf.continue_orbit(orbit, "Omega", (0.538, 0.545)).bifurcations
+    proofs = [event.certify(), orbit.certify()]
+    assert [part["certificate"] for part in files.checkable(proofs)] == ["event", "orbit"]
+    own = files.event_data
+    monkeypatch.setattr(files, "event_data", lambda proof: own(proof) | {"kind": "PD"})
+    assert [part["certificate"] for part in files.checkable(proofs)] == ["orbit"]
