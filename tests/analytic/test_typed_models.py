@@ -51,3 +51,26 @@ def test_a_blow_that_jumps_where_motion_meets_it_is_refused(tmp_path, blow: str)
     text = text.replace("field: F", "field: {x: v, v: -x - 2*c*v}").replace("v + p*sign(v)", blow)
     report = cf.check_model(typed(tmp_path, text.replace("symmetry: x -> -x, v -> -v", "")))
     assert any("between states that meet it in mode 'falls'" in str(f) for f in report.findings)
+
+
+GENES = """
+name: genes
+states: [x, y]
+parameters: {k: 2.0, A: 0.6, W: 1.0, th: 1.0}
+period: 2*pi/W
+surfaces: {X: {observable: x, level: th}, Y: {observable: y, level: th}}
+modes:
+  both: {in: {X: +, Y: +}, field: {x: A*cos(W*t) - x, y: k - y}}
+  xo: {in: {X: +, Y: -}, field: {x: k + A*cos(W*t) - x, y: k - y}}
+  oy: {in: {X: -, Y: +}, field: {x: A*cos(W*t) - x, y: -y}}
+  none: {in: {X: -, Y: -}, field: {x: k + A*cos(W*t) - x, y: -y}}
+"""
+
+
+@pytest.mark.parametrize("A", [0.0, 0.6])
+def test_a_motion_with_excitation_winds_into_a_point(tmp_path, A: float) -> None:
+    """A turn of size d takes a time of about d and shrinks by a share of about d: no period ends."""
+    with pytest.raises(
+        cf.ConvergenceError, match=r"comes to rest near x = (1|0\.99).*, y = (1|0\.99)"
+    ):
+        cf.find_orbit(typed(tmp_path, GENES), {"A": A}, state=[0.5, 0.5])
