@@ -41,7 +41,7 @@ class SimulationEnd(str, Enum):
 
     EVENTS = "the number of events asked for was reached"
     TIME = "the time asked for was reached"
-    HELD = "the mass stays at rest for ever: nothing releases it"
+    HELD = "the motion stays on a surface for ever (a mass at rest): nothing releases it"
     IMPOSSIBLE = "events follow each other at once, and time does not go on"
     INFINITE = "the solution diverged"
     QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
