@@ -19,6 +19,8 @@ _LINEAR = 3
 _NEARLY_SYMMETRIC = 1e-6
 #: Rounding of the equations of an orbit: some fifty units of its states.
 _ROUNDING = 1e-14
+#: Share of its level by which rounding leaves the end of a segment open, above which Newton's method fails.
+_UNKNOWN = 1e-4
 #: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
 _BESIDE_START = (1.3e-3, -1.3e-3)
 
@@ -64,7 +66,28 @@ def _why(orbit: Orbit, settings: Settings) -> str:
             f"it is one of a continuum of orbits, at each {settings.parameter} near it, too. Continue the "
             "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
         )
-    return "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
+    return too_fast(orbit) or (
+        "the equations are singular there (a bifurcation). Move the parameter a little and solve again"
+    )
+
+
+def too_fast(orbit: Orbit) -> str:
+    """Return which segment ends so fast that rounding of its duration decides where; nothing if none does.
+
+    By eps T |h'| the observable h of its end is unknown, for a duration T: a neuron that blows up,
+    V' = exp(V), and is cut far up.
+    """
+    model, view = orbit.model, orbit.model.view(orbit.vector)
+    for (mode, surface), begin, end in zip(orbit.itinerary, orbit.begins, orbit.ends, strict=True):
+        rate = abs(view.rate(mode, model.surface_by_name[surface].observable, end[0], end[1:]))
+        lost = rate * np.finfo(float).eps * abs(end[0] - begin[0])
+        if lost > _UNKNOWN * (1.0 + abs(view.level(surface))):
+            return (
+                f"'{mode}' comes to '{surface}' at a rate of {rate:.1g}: rounding of the time is {lost:.1g} "
+                "of its observable. Move the surface to where motion is slower: a neuron that "
+                "blows up is at any height at nearly the same time"
+            )
+    return ""
 
 
 def _off_events(orbit: Orbit, start: Point, settings: Settings) -> tuple[Orbit, Point]:

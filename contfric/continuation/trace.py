@@ -13,7 +13,7 @@ from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Setting
 from contfric.continuation.resolve import end_of_holds, resolve
 from contfric.continuation.section_joints import move_joints
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.start import start_of
+from contfric.continuation.start import start_of, too_fast
 from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
 from contfric.continuation.vertical import Family, family_near
@@ -214,6 +214,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             m in orbit.model.chatter_by_mode for m, _ in orbit.itinerary
         ):
             side.end = End(EndReason.BROKEN, _NO_REST)
+        elif why == kernels.BROKEN:
+            side.end = End(EndReason.BROKEN, too_fast(_tip(orbit, side, settings)))
         if why in (kernels.STEP, kernels.BROKEN) and is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
         elif why in (kernels.STEP, kernels.BROKEN) and never_leaves(_tip(orbit, side, settings)):

@@ -14,7 +14,8 @@ Another period than that of the model is refused: where two clocks tick at once,
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import reduce
 from typing import Any
 
 from contfric.base.yaml_lines import Address
@@ -233,15 +234,22 @@ class _Reader(ast.NodeTransformer):
 
 
 def _shift_of(time: ast.expr) -> ast.expr | None:
-    """Return a of ``t + a``, ``a + t`` and ``t - a`` (then -a); None of others."""
-    if not isinstance(time, ast.BinOp) or not isinstance(time.op, (ast.Add, ast.Sub)):
+    """Return a of a sum ``t + a``, its terms in any order (``t + T - d``); None of others."""
+    terms = list(_terms(time, 1))
+    timed = [(s, e) for s, e in terms if any(map(_is_time, ast.walk(e)))]
+    if len(terms) < 2 or len(timed) != 1 or timed[0][0] < 0 or not _is_time(timed[0][1]):
         return None
-    sides = [time.left, time.right]
-    if isinstance(time.op, ast.Add) and _is_time(sides[1]):
-        sides.reverse()
-    if not _is_time(sides[0]) or any(_is_time(n) for n in ast.walk(sides[1])):
-        return None
-    return sides[1] if isinstance(time.op, ast.Add) else ast.UnaryOp(ast.USub(), sides[1])
+    rest = [e if s > 0 else ast.UnaryOp(ast.USub(), e) for s, e in terms if (s, e) not in timed]
+    return reduce(lambda a, b: ast.BinOp(a, ast.Add(), b), rest)
+
+
+def _terms(node: ast.expr, sign: int) -> Iterator[tuple[int, ast.expr]]:
+    """Yield the terms of a sum, each with its sign."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Add, ast.Sub)):
+        yield from _terms(node.left, sign)
+        yield from _terms(node.right, sign if isinstance(node.op, ast.Add) else -sign)
+    else:
+        yield sign, node
 
 
 def _is_time(node: ast.AST) -> bool:

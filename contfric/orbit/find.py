@@ -15,7 +15,7 @@ from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, goes_on, wh
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
-from contfric.orbit.rest import check_rest, comes_to_rest, is_point
+from contfric.orbit.rest import check_rest, comes_to_rest, is_point, winds
 from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
@@ -41,6 +41,8 @@ _FIRST, _LONGER = 200, 4
 #: Events without excitation after which is looked, too: the unit of time need not be that of the motion.
 _FIRST_EVENTS = 5_000
 _MOST_EVENTS_AT_ONCE = 10_000_000
+#: Events with excitation after which is looked whether they are turns about a point.
+_TURNS = 100_000
 #: Share of the time of the first half of these that the second half takes if they do not come faster.
 _STEADY = 0.5
 #: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
@@ -119,9 +121,11 @@ def _settled(
             model, params, state=state, time=time, periods=asked, events=events, progress=heard
         )
 
-    trajectory = simulated(_FIRST_EVENTS if model.autonomous else _MOST_EVENTS_AT_ONCE)
-    if model.autonomous and trajectory.end is SimulationEnd.EVENTS:
-        if _is_steady(trajectory):
+    trajectory = simulated(_FIRST_EVENTS if model.autonomous else _TURNS)
+    if trajectory.end is SimulationEnd.EVENTS:
+        if not model.autonomous and winds(trajectory):
+            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
+        if model.autonomous and _is_steady(trajectory):
             unit = float(trajectory.last[1] - trajectory.begin[0]) / span
         trajectory = simulated(_MOST_EVENTS_AT_ONCE)
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:

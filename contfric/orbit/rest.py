@@ -14,6 +14,9 @@ from contfric.orbit.simulation import Trajectory
 _RESTS, _SHORT = 1e-13, 1e-1
 #: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
 _NO_SIZE = 1e-6
+#: Turns about a point: the last half of all events lie this near to each other (relative to 1 + the states),
+#: and the last quarter nearer than the one before it (by 2/3, where turns shrink like 1/n).
+_WOUND, _SHRINKS = 1e-3, 0.8
 
 
 def check_rest(trajectory: Trajectory) -> None:
@@ -43,6 +46,21 @@ def is_point(orbit: Orbit) -> bool:
     """Tell whether an orbit has no size: a motion that turns about the place where its surfaces meet."""
     states = np.concatenate([orbit.begins[:, 1:], orbit.ends[:, 1:]])
     return bool(np.max(np.ptp(states, axis=0)) < _NO_SIZE * (1.0 + np.max(np.abs(states))))
+
+
+def winds(trajectory: Trajectory) -> bool:
+    """Tell whether a motion with excitation winds into a point, in turns that shrink like 1/n.
+
+    They take times like 1/n, too: within a time t the motion meets exp(t) events, and no period ends.
+    """
+    half, last = len(trajectory) // 2, 3 * len(trajectory) // 4
+    before, lately = (
+        np.max(np.ptp(part, axis=0))
+        for part in (trajectory.states[half:last], trajectory.states[last:])
+    )
+    near = before < _WOUND * (1.0 + np.max(np.abs(trajectory.states[-1])))
+    within = trajectory.cycles[-1] - trajectory.cycles[half] <= 1
+    return bool(near and within and lately < _SHRINKS * before)
 
 
 def comes_to_rest(trajectory: Trajectory) -> str:

@@ -41,7 +41,7 @@ class SimulationEnd(str, Enum):
 
     EVENTS = "the number of events asked for was reached"
     TIME = "the time asked for was reached"
-    HELD = "the motion stays on a surface for ever: nothing releases it"
+    HELD = "the motion stays on a surface for ever (a mass at rest): nothing releases it"
     IMPOSSIBLE = (
         "no mode holds where the motion has come to, or events follow each other at once, so that time does "
         "not go on"

@@ -279,7 +279,7 @@ units: {t: 1.0e-4}
 """
 
 
-@pytest.mark.parametrize("shift", ["t + a*T", "t - (1 - a)*T"])
+@pytest.mark.parametrize("shift", ["t + a*T", "t - (1 - a)*T", "T + t - (T - a*T)"])
 def test_two_converters_whose_clocks_are_apart(tmp_path: Path, shift: str) -> None:
     """With a resistance of the coils, a period is one affine map in each of four phases."""
     text = INTERLEAVED.replace("t + a*T", shift)

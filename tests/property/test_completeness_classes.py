@@ -135,6 +135,8 @@ def test_a_bridge_that_ends_at_a_symmetric_orbit(friction: float, limit: float) 
     found = cf.explore(cf.find_orbit("coulomb", params), "Omega", (0.4, 0.6))
     verified = found.verify()
     assert len(verified.restarts) == 6 and verified.same, str(verified)
+    # at S = 0.32 the balance of one SS_s fails still (docs/stress.md)
+    assert verified.passed or friction == 0.32, str(verified)
     (bridge,) = (
         b
         for b in found.branches

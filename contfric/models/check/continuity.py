@@ -123,7 +123,11 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
     for reset in probe.model.resets:
         known: dict[Sides, tuple[float, FloatArray]] = {}
         for domain, t, y in arrivals(probe, reset):
-            here = known.setdefault(_real_sides(probe, reset, domain.signs), (t, y))
+            side = (
+                reset.surface,
+                domain.signs[reset.surface],
+            )  # motion comes from it: the rate has its sign
+            here = known.setdefault(_real_sides(probe, reset, domain.signs) | {side}, (t, y))
             if here[1] is y:
                 continue
             values = partial(_behind, probe, reset, domain, here, (t, y))
@@ -152,7 +156,8 @@ def _behind(
     """Return the state behind a reset from between two states; None where that is in another domain."""
     t, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
     sides = _real_sides(probe, reset, probe.signs(t, y))
-    if sides != _real_sides(probe, reset, domain.signs):
+    towards = domain.signs[reset.surface] * probe.rate(domain.own_mode, reset.surface, t, y) < 0.0
+    if not towards or sides != _real_sides(probe, reset, domain.signs):
         return None
     return probe.reset(reset.surface, t, y).copy()
 

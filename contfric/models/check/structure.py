@@ -374,8 +374,8 @@ def check_angles(report: ModelReport, probe: Probe) -> None:
                 if not np.allclose(here, there, rtol=_SAME, atol=_SAME):
                     report.error(
                         Topic.PERIOD,
-                        f"the field of '{mode.name}' is not the same a turn of '{state}' later: "
-                        "that is no angle",
+                        f"the field of '{mode.name}' is not the same a turn of '{state}' later: that is no "
+                        f"angle. A saw-tooth is a surface '{state} = pi' with a reset '{state} - 2*pi'",
                     )
                     return
 
