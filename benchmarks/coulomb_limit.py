@@ -69,7 +69,7 @@ def released(law: Law, rate: float) -> float:
     field = bristles if ahead else lambda t, y: [law.S0 + rate * t - g(y[0])]
     run = solve_ivp(field, (-ahead / rate, 9.0), start, "Radau", rtol=1e-9, atol=1e-14, events=gone)
     t, v = float(run.t[-1]), float(run.y[0, -1])
-    c = v - D * t - 0.5 * rate * t * t  # v = D (t - d) + rate (t^2 - d^2) / 2 behind the delay d
+    c = v - D * t - 0.5 * rate * t * t  # v = D (t - d) + rate (t^2 - d^2) / 2 after the delay d
     return (math.sqrt(D * D - 2.0 * rate * c) - D) / rate
 
 

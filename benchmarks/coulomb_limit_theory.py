@@ -157,7 +157,7 @@ class Slide:
 
 
 def amplitudes(law: Law, Omega: float, turns: int, delays: bool = True) -> np.ndarray:
-    """Both amplitudes of the motion that Coulomb's rules converge to, with the delays of a law."""
+    """Both amplitudes of the solution that Coulomb's rules converge to, with the delays of a law."""
     stop, x = 0.0, 1.0  # at rest, without load
     stops: list[float] = []
     for _ in range(turns):
@@ -168,7 +168,7 @@ def amplitudes(law: Law, Omega: float, turns: int, delays: bool = True) -> np.nd
 
 
 def _behind(stop: float, x: float, Omega: float, law: Law, delays: bool) -> Slide:
-    """The slide behind a stop."""
+    """The slide after a stop."""
     load = x - math.cos(Omega * stop)
     if abs(load) >= law.S0:
         late = law.departure(abs(load)) - law.stop(abs(load)) if delays else 0.0

@@ -1,4 +1,4 @@
-"""What it costs that a motion is integrated: beside the closed form, and beside scipy's integrators.
+"""What it costs that a solution is integrated: next to the closed form, and beside scipy's integrators.
 
 ``python benchmarks/integrated.py`` writes ``docs/benchmarks-integrated.md`` and its figure. Times are the
 least processor times of many calls: they are those of the code, not of what else runs on the machine.
@@ -143,7 +143,7 @@ SEGMENTS: dict[str, tuple[Any, ...]] = {
 }
 
 
-#: What a motion is integrated with: a slide with Coulomb friction is nowhere stiff.
+#: What a solution is integrated with: a slide with Coulomb friction is nowhere stiff.
 METHODS = {
     coulomb_integrated: ("explicit",),
     lugre_integrated: ("explicit", "implicit", "automatic"),

@@ -35,7 +35,7 @@ NEAR = 1e-6
 def starts(
     orbit: cf.Orbit, name: str, bounds: tuple[float, float], fold: bool
 ) -> Iterator[cf.Orbit]:
-    """Yield orbits beside a bifurcation to start a run from."""
+    """Yield orbits next to a bifurcation to start a run from."""
     active, width = orbit.model.index_of(name), bounds[1] - bounds[0]
     for distance in APART:
         for sign in (1.0, -1.0):

@@ -25,7 +25,7 @@ OURS, THEIRS, EXACT = (1e-10, 1e-11, 1e-12), (1e-10, 1e-12, 1e-14), 1e-14
 #: Turns in which all take part, and calls in each.
 TURNS, CALLS = 40, 3
 
-#: The state behind a period, and its derivatives by the state before it.
+#: The state after a period, and its derivatives by the state before it.
 Mapped = tuple[np.ndarray, np.ndarray]
 
 

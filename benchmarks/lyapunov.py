@@ -36,7 +36,7 @@ ALLOWED = {100: 7.0, 150: 15.0}
 #: Side and periods of the map whose memory is measured, and what it may take (MB). Its memory does not
 #: depend on the periods: a hundredth of them serves.
 LARGE, FEW, WANTED = 1000, 6, 500
-#: Chaotic motions with sticks; with damping the closed form takes complex numbers, with h a cubic.
+#: Chaotic solutions with sticks; with damping the closed form takes complex numbers, with h a cubic.
 MOTIONS = {
     "chaotic (Omega 0.35, S 0.05)": {"Omega": 0.35, "S": 0.05, "S0": 0.4},
     "chaotic, damped (zeta 0.002)": {"Omega": 0.35, "S": 0.05, "S0": 0.4, "zeta": 0.002},
@@ -83,7 +83,7 @@ def maps(rounds: int, sides: tuple[int, ...]) -> list[str]:
             found[side] = clock.time(lambda side=side: map_of(side))
     lines = [
         f"| map | wall (median) | wall (minimum) | wanted, on 2 processors | processor (minimum) "
-        f"| a motion | periods followed (of {PERIODS + 100}) |",
+        f"| a solution | periods followed (of {PERIODS + 100}) |",
         "|---|---|---|---|---|---|---|",
     ]
     for side, clock in clocks.items():
@@ -99,7 +99,7 @@ def maps(rounds: int, sides: tuple[int, ...]) -> list[str]:
 
 
 def tangents(rounds: int, periods: int) -> list[str]:
-    """Cost of a joint with the tangent map, beside the simulation alone."""
+    """Cost of a joint with the tangent map, next to the simulation alone."""
     model = cf.load_model("coulomb")
     lines = [
         "| motion | joints a period | simulation, a joint | with exponents, a joint | a period |",
@@ -123,7 +123,7 @@ def tangents(rounds: int, periods: int) -> list[str]:
 
 
 def estimates(rounds: int) -> list[str]:
-    """The tangent map beside the two-orbit estimate, on chaotic motions."""
+    """The tangent map next to the two-orbit estimate, on chaotic motions."""
     lines = [
         "| motion | tangent map | error | two orbits | error | difference in errors "
         "| time of the tangent map | of two orbits |",
@@ -156,7 +156,7 @@ def estimates(rounds: int) -> list[str]:
 
 
 def accuracy(count: int) -> list[str]:
-    """Exponents of random periodic motions against the multipliers of the boundary-value problem."""
+    """Exponents of random periodic solutions against the multipliers of the boundary-value problem."""
     rng = np.random.default_rng(11)
     worst, compared, sticking = 0.0, 0, 0
     while compared < count:
@@ -172,7 +172,7 @@ def accuracy(count: int) -> list[str]:
         sticking += int(not kept.all())
         compared += 1
     return [
-        f"{count} random periodic motions ({sticking} with sticks): the exponents differ from "
+        f"{count} random periodic solutions ({sticking} with sticks): the exponents differ from "
         f"`ln|multiplier| / period` of the solved orbit by {worst:.1e} at most (wanted: 1e-6)."
     ]
 

@@ -1,4 +1,4 @@
-"""Exponents of integrated models: cost beside the closed form, where it goes, and the first call.
+"""Exponents of integrated models: cost next to the closed form, where it goes, and the first call.
 
 ``python benchmarks/lyapunov_models.py`` measures and renews its section of docs/lyapunov.md; ``--first`` only
 prints what the first call costs (minutes of compilation). Times are least processor times of several rounds.
@@ -27,10 +27,10 @@ from contfric.orbit.simulation import Trajectory, tables
 PAGE = Path(__file__).parents[1] / "docs" / "lyapunov.md"
 BEGIN = "<!-- begin of benchmarks/lyapunov_models.py -->"
 END = "<!-- end of benchmarks/lyapunov_models.py -->"
-#: Motions that never end: chaotic ones. Model, parameters.
+#: Solutions that never end: chaotic ones. Model, parameters.
 MOTIONS: dict[str, tuple[str, dict[str, float]]] = {
     "coulomb, in closed form": ("coulomb", {"Omega": 0.35, "S": 0.05, "S0": 0.4}),
-    "coulomb-yaml, the same motion": ("coulomb-yaml", {"Omega": 0.35, "S": 0.05, "S0": 0.4}),
+    "coulomb-yaml, the same solution": ("coulomb-yaml", {"Omega": 0.35, "S": 0.05, "S0": 0.4}),
     "popp": ("popp", {"omega": 1.69, "F": 0.1}),
     "impact": ("impact", {"w": 2.8, "d": 0.0}),
     "bang-bang": ("bang-bang", {"A": 100.0}),
@@ -115,7 +115,7 @@ def costs() -> list[str]:
 
 
 def maps() -> list[str]:
-    """Return how much a map costs beside the closed form."""
+    """Return how much a map costs next to the closed form."""
     grid = {"Omega": np.linspace(0.1, 0.6, 12), "S": np.linspace(0.0, 0.4, 10)}
     took = {}
     for name in ("coulomb", "coulomb-yaml"):
@@ -125,7 +125,7 @@ def maps() -> list[str]:
         )
     ratio = took["coulomb-yaml"] / took["coulomb"]
     return [
-        f"A map of 12 x 10 motions of the plane of Fig. 9 takes {took['coulomb']:.3f} s in closed form and "
+        f"A map of 12 x 10 solutions of the plane of Fig. 9 takes {took['coulomb']:.3f} s in closed form and "
         f"{took['coulomb-yaml']:.2f} s as `coulomb-yaml` (processor time): **generality costs a factor of "
         f"{ratio:.0f}**."
     ]

@@ -67,7 +67,7 @@ def chain() -> Iterator[Orbit]:
 
 
 def unsolved(orbit: Orbit) -> Orbit:
-    """A start beside the orbit."""
+    """A start next to the orbit."""
     joints = orbit.joints.copy()
     signs = np.where(np.arange(len(joints)) % 2 == 0, 1.0, -1.0)
     joints[:, :2] += OFF * signs[:, None]

@@ -101,7 +101,7 @@ def main() -> None:
         "of the processor for a point: prediction, Newton's method, all margins with their stationary "
         f"points; and with multipliers. The least of {ROUNDS} branches in turns with a yardstick (200,000 "
         "numbers sorted, milliseconds), all that a call costs divided by its points. Beyond six "
-        "states most of each motion is kept from point to point (docs/integration.md), which is part of "
+        "states most of each solution is kept from point to point (docs/integration.md), which is part of "
         "the time of the first points.",
         "",
         "| states | points | a point | with multipliers | along k | with multipliers | yardstick |",

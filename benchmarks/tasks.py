@@ -192,7 +192,7 @@ def simulated(periods: int) -> tuple[list[tuple[int, float]], str]:
 
 
 def by_peer(method: Method, count: int) -> tuple[list[tuple[int, float]], str]:
-    """Simulate with an integrator; another number of events is another motion, and a failure."""
+    """Simulate with an integrator; another number of events is another solution, and a failure."""
     found, remark = simulation.simulate(HEIGHT, PERIODS, (OMEGA, S, S0), method.how)
     if len(found) != count:
         raise Failure(f"{len(found)} events instead of {count}")

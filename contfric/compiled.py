@@ -77,7 +77,7 @@ period_signature = f8(vector, indices, vector)
 #: rate(mode, c, t, y, p, which, grad): rate of observable c along a mode; ``grad`` (1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if empty.
 rate_signature = f8(i8, i8, f8, vector, vector, indices, vector)
-#: reset(k, t, y, p, which, y1, jac): state behind the reset at surface k; ``jac`` (n, 1 + n + len(which))
+#: reset(k, t, y, p, which, y1, jac): state after the reset at surface k; ``jac`` (n, 1 + n + len(which))
 #: holds its derivatives with respect to t, y and the parameters ``which``; not filled if it is empty.
 reset_signature = types.void(i8, f8, vector, vector, indices, vector, matrix)
 #: field(mode, t, y, p, which, out, jac): dy/dt along a mode; ``jac`` as that of reset.
@@ -224,7 +224,7 @@ def compile_aside(kernels: Sequence[str]) -> None:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Do not leave a process behind that nobody waits for any more."""
+    """Do not leave a process after that nobody waits for any more."""
     if process.poll() is None:
         process.terminate()
     process.wait()

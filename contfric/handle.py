@@ -118,7 +118,7 @@ def with_handle(signature: Any, handle: HandleType) -> Any:
 
 
 class Block:
-    """The memory behind a handle; what it points to lives as long as it does.
+    """The memory after a handle; what it points to lives as long as it does.
 
     Parameters
     ----------

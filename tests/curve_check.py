@@ -10,7 +10,7 @@ import contfric as cf
 from contfric.continuation.switching import null_vector
 from contfric.orbit.solve import refine
 
-#: How far beside a point the run starts, and how far it goes.
+#: How far next to a point the run starts, and how far it goes.
 OFFSETS = (1e-4, -1e-4, 1e-3, -1e-3, 1e-5, -1e-5)
 WIDTH = 5e-3
 

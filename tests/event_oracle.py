@@ -76,7 +76,7 @@ def _is_fold(data: dict[str, Any], value: mpf, radius: mpf) -> bool:
 
 
 def _obeys(data: dict[str, Any], truth: Truth, z: list[mpf]) -> bool:
-    """Tell whether the orbit is admissible a little beside the limit that it meets."""
+    """Tell whether the orbit is admissible a little next to the limit that it meets."""
     if data["kind"] in _TOUCHES:
         i, surface, _ = data["at"]
         slides = truth.segments[i][0] != "stick"

@@ -17,7 +17,7 @@ MOST_POINTS = 1000
 
 @dataclass(frozen=True)
 class Task:
-    """A start, the length of the steps, and Omega at both ends: the lower one, and that behind the fold.
+    """A start, the length of the steps, and Omega at both ends: the lower one, and that after the fold.
 
     ``first`` is the step in Omega for a method that has no tangent to begin with.
     """

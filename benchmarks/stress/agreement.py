@@ -151,7 +151,7 @@ def admissible(exact: Exact, samples: int = 9) -> str:
         if low < 0:
             return f"segment {i + 1} leaves its mode by {float(low):.3g}"
         if s != 0 and (low := _at_stop(chain, p, i, (t1, x1))) < 0:
-            return f"the stop behind segment {i + 1} is on the wrong side by {float(low):.3g}"
+            return f"the stop after segment {i + 1} is on the wrong side by {float(low):.3g}"
     return ""
 
 

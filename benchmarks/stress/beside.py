@@ -1,4 +1,4 @@
-"""Margins of an orbit in 50 digits, and orbits just beside an event: solved, judged, continued."""
+"""Margins of an orbit in 50 digits, and orbits just next to an event: solved, judged, continued."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from contfric.orbit.system import Margin, Test
 NEAR, TOUCHING = 1e-10, 1e-12
 #: Beside a fold an orbit is the root of that distance away, times its curvature.
 AWAY = 1e-3
-#: Share of the range over which a branch is followed from beside an event.
+#: Share of the range over which a branch is followed from next to an event.
 FOLLOWED = 0.02
 #: An exit that is met with a rate below this is tangential: multipliers are as large as 1/rate.
 TANGENTIAL = 1e-12
@@ -56,7 +56,7 @@ def margin(exact: Exact, kind: str, test: Test) -> Any:
 
 
 def moved(event: cf.Bifurcation, parameter: str, by: float) -> cf.Orbit | None:
-    """Return the orbit of an event solved beside it; None where the model has no such parameters."""
+    """Return the orbit of an event solved next to it; None where the model has no such parameters."""
     orbit = event.orbit
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(parameter)] += by
@@ -141,7 +141,7 @@ def follow(
     name: str,
     where: str,
 ) -> None:
-    """Continue from beside an event: both ends have their reasons, or a message says why not."""
+    """Continue from next to an event: both ends have their reasons, or a message says why not."""
     value, width = orbit.params[parameter], FOLLOWED * (bounds[1] - bounds[0])
     try:
         branch = cf.continue_orbit(orbit, parameter, (value - width, value + width))
@@ -149,5 +149,5 @@ def follow(
         tally.met(f"continued from {name} of an event: {refusal(error)}")
         return
     for end in branch.ends:
-        tally.check("continued from beside an event: ends have reasons", bool(str(end)), where)
-        tally.met(f"continued from beside an event: {end.reason.name}")
+        tally.check("continued from next to an event: ends have reasons", bool(str(end)), where)
+        tally.met(f"continued from next to an event: {end.reason.name}")

@@ -8,7 +8,7 @@ joints, with two equations a segment::
     stick:                 x_i = x_{i+1},                   x_{i+1} - f(t_{i+1}) = side S0
 
 and the closure ``z_N = (t_0 + turn, x_0)``, or ``(t_0 + turn, -x_0)`` after half of a symmetric orbit.
-X and V are those of a textbook: undetermined coefficients, and the free motion that makes up the
+X and V are those of a textbook: undetermined coefficients, and the free solution that makes up the
 difference. They cancel beside resonance; there are digits to be spent.
 
 Of contfric's results only the order of the segments and a start for Newton are used.
@@ -50,7 +50,7 @@ def force(p: Sequence[Any], t: Any) -> tuple[Any, Any, Any]:
 
 
 def free(zeta: Any, d: Any) -> tuple[Any, Any, Any]:
-    """Return the free motion after d: x from x0 = 1, x from v0 = 1, v from v0 = 1.
+    """Return the free solution after d: x from x0 = 1, x from v0 = 1, v from v0 = 1.
 
     (The fourth, v from x0 = 1, is minus the second.)
     """
@@ -85,7 +85,7 @@ def particular(p: Sequence[Any], s: int, t: Any, since: Any) -> tuple[Any, Any]:
 
 
 def slide(p: Sequence[Any], s: int, start: Joint, t: Any) -> tuple[Any, Any, tuple[Any, Any, Any]]:
-    """Return x and v at t of a slide from rest, and the free motion in between."""
+    """Return x and v at t of a slide from rest, and the free solution in between."""
     t0, x0 = start
     x1, v1 = particular(p, s, t, t0)
     xa, va = particular(p, s, t0, t0)

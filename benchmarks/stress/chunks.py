@@ -101,7 +101,7 @@ class Chunked:
 
 
 def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float) -> None:
-    """Write what is done, beside the report to come."""
+    """Write what is done, next to the report to come."""
     data = {"seed": seed, "seconds": seconds, "done": {k: asdict(v) for k, v in done.items()}}
     part = out.with_suffix(".part")
     part.write_text(json.dumps(data), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Located events of random explorations, against 50 digits; orbits and branches beside them.
+"""Located events of random explorations, against 50 digits; orbits and branches next to them.
 
 ``python benchmarks/stress/events.py --count 100 --seed 0 --out events.json``
 """
@@ -89,7 +89,7 @@ def draw(rng: np.random.Generator) -> Params:
 
 
 def one_case(tally: Tally, seed: int, index: int) -> None:
-    """Explore, and look at every event and beside it."""
+    """Explore, and look at every event and next to it."""
     found = scene(tally, seed, index)
     if found is None:
         return

@@ -175,7 +175,7 @@ def again(tally: Tally, orbit: cf.Orbit, params: Params, where: str) -> None:
 
 
 def cascade(tally: Tally, orbit: cf.Orbit, rng: np.random.Generator) -> None:
-    """Orbits of many periods, stable or not, through the period doublings beside an orbit."""
+    """Orbits of many periods, stable or not, through the period doublings next to an orbit."""
     parameter = str(rng.choice(["Omega", "S", "S0"]))
     value = orbit.params[parameter]
     bounds = (0.95 * value, 1.05 * value)

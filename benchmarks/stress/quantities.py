@@ -1,6 +1,6 @@
 """All zeros of the load, the velocity and their rates along a segment, in fifty digits.
 
-Each of these is a motion of the same oscillator under another force, so that the windows of
+Each of these is a solution of the same oscillator under another force, so that the windows of
 :mod:`first_root` hold for all of them. A harmonic ``Re(e^{i p})`` of the force f becomes ``Re(c e^{i p})``:
 
 ====== =========================== ============================
@@ -27,7 +27,7 @@ RATE = {"v": "a", "u": "du"}
 
 
 def turned(law: Law, phase: Phase, name: str) -> list[arb]:
-    """Return the phase numbers of the force behind a quantity."""
+    """Return the phase numbers of the force after a quantity."""
     numbers: list[arb] = []
     for k in (0, 2):
         c, s = phase[k], phase[k + 1]

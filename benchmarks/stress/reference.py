@@ -114,7 +114,7 @@ class Law:
         return x, v
 
     def free(self, d: arb) -> tuple[arb, arb]:
-        """Return the free motion (x, v) from x = 0, v = 1."""
+        """Return the free solution (x, v) from x = 0, v = 1."""
         zeta, rate = self.zeta, self.rate
         if zeta == 0:
             return d.sin_cos()

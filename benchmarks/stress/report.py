@@ -129,7 +129,7 @@ class Tally:
 
 
 def say(text: str) -> None:
-    """Report progress to the terminal, beside the results."""
+    """Report progress to the terminal, next to the results."""
     print(text, file=sys.stderr, flush=True)
 
 

@@ -23,7 +23,7 @@ Params = dict[str, float]
 ZETAS = (0.0, 0.0, 0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.05, 0.3, 1.0, 1.0 + 1e-9, 3.0)
 #: Distances to resonance; exactly there in one case of seven.
 BESIDE = (0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, -1e-9)
-#: Periods to simulate before a motion counts as aperiodic: what creeps longer is another start.
+#: Periods to simulate before a solution counts as aperiodic: what creeps longer is another start.
 LONGEST = 3000
 #: Without damping resonance is bounded where friction takes more than the force gives: S > pi/4.
 RESONANT = np.pi / 4

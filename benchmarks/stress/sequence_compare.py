@@ -1,4 +1,4 @@
-"""One simulation of contfric beside the reference of fifty digits: mode, surface, time, position.
+"""One simulation of contfric next to the reference of fifty digits: mode, surface, time, position.
 
 An error above ``LIMIT`` sigma (:mod:`sequence_errors`) fails. What cannot be compared is counted, and the
 comparison of that trajectory ends there:

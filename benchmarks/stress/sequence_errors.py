@@ -1,6 +1,6 @@
 """What errors a simulation in doubles may have: its own rounding, carried along by the tangent maps.
 
-A double computation rounds at each segment, and the motion amplifies what was rounded. Both are known:
+A double computation rounds at each segment, and the solution amplifies what was rounded. Both are known:
 let ``J_k`` be the tangent map of segment k in (t, x) (:mod:`motion`), and ``N_k`` the diagonal of the
 squares of what the segment's own arithmetic costs (:class:`Rounding`). Then
 
@@ -65,7 +65,7 @@ class Rounding:
         """Return the error of a state after a duration d from one of this size.
 
         Half a unit in the last place of each phase (up to 2 pi, and w d), of d, and of the result; times
-        the amplitudes: of the free motion, and of the response, which at resonance grows like d.
+        the amplitudes: of the free solution, and of the response, which at resonance grows like d.
         """
         p = self.p
         response = (1 + abs(p["h"])) * min(1 + d, self.response)
@@ -90,7 +90,7 @@ class Rounding:
     def start(self, case: Case, law: Law) -> Spread:
         """Return the errors of a start: its time is split into periods and phase; x is exact.
 
-        On a surface, the reference starts at another x, by what the double is beside the surface.
+        On a surface, the reference starts at another x, by what the double is next to the surface.
         """
         s = case.start
         clock = EPS * (abs(s.time) + self.period)

@@ -67,7 +67,7 @@ EXPLANATIONS = {
         "are the states at which segments meet."
     ),
     "events": (
-        "The parameter value of each event, and orbits just beside it: at a distance of 1e-10 in the "
+        "The parameter value of each event, and orbits just next to it: at a distance of 1e-10 in the "
         "parameter, and where a branch is stopped 1e-12 before it."
     ),
     "continuation": (
@@ -113,7 +113,7 @@ def page(reports: list[Report]) -> str:
 
 
 def _folded(lines: list[str]) -> list[str]:
-    """Return the lines of a report with its failures, which are long, behind a click."""
+    """Return the lines of a report with its failures, which are long, after a click."""
     first = next((k for k, line in enumerate(lines) if line.startswith("* case ")), len(lines))
     if first == len(lines):
         return lines

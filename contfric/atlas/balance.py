@@ -39,7 +39,7 @@ _SHARES = (0.381966, 0.618034)
 _APART = 1e-6
 #: Where rest is tried near an event, relative to the range: beyond the accuracy of the event.
 _REST_BESIDE = 1e-4
-#: Events of a trial of rest: a motion has some in each period.
+#: Events of a trial of rest: a solution has some in each period.
 _EVENTS = 20
 #: Its length in periods: no whole number, so that what moves is elsewhere at its end.
 _TRIED = 2.3
@@ -123,7 +123,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             for joined in nodes
             for found in _families(diagram, diagram.nodes[joined], value, slack)
         ]
-        # a graze is known to the root of rounding, and may not show that its motion repeats itself
+        # a graze is known to the root of rounding, and may not show that its solution repeats itself
         lengths = [*(unit_of(whole).periods for whole in units), *(o.periods for _, o in families)]
         period = math.gcd(*lengths)
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
@@ -143,7 +143,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
-    """Return the orbit at an event behind which the mass stays at rest for ever; None at others."""
+    """Return the orbit at an event after which the mass stays at rest for ever; None at others."""
     return _ended(diagram, node, EndReason.REST)
 
 

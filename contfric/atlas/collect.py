@@ -52,7 +52,7 @@ class Event:
     members : the same event as located on the other branches
     proposals : what was proposed to follow it
     final : why nothing is continued from it, if that is known: the mass stays at rest, or a continuum
-    kinds : what the itineraries of its motion call it
+    kinds : what the itineraries of its solution call it
     begun : whether what leaves it has been begun in advance
     paired : whether the branch that leaves the event before it may well end here
     """

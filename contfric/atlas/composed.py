@@ -1,7 +1,7 @@
 """Events of structures with many contacts: which orders of the changes are tried, and when it is enough.
 
 Where nothing jumps, the return map is continuous and piecewise smooth. Two contacts that change at once
-change in the other order behind the event, and k pairs that do so at once (by symmetry, most often) have
+change in the other order after the event, and k pairs that do so at once (by symmetry, most often) have
 ``2^k`` orders. The one in which all are exchanged is tried first. The sum of the indices of all orbits is the
 same on both sides of an event: where it is for the branches that are known, others could only come in pairs
 beyond that, and are not sought.

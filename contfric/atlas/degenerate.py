@@ -54,10 +54,10 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
 
 
 def _alike(a: Bifurcation, b: Bifurcation) -> bool:
-    """Tell whether the motions at two events may be taken for one, run through as often as it takes.
+    """Tell whether the solutions at two events may be taken for one, run through as often as it takes.
 
     Slides one after the other are compared: sequences of the same passages in another order are told apart.
-    Where one motion has more slides than the other, only their stops can be.
+    Where one solution has more slides than the other, only their stops can be.
     """
     one, other = a.outline, b.outline
     if len(one.starts) * other.periods != len(other.starts) * one.periods:

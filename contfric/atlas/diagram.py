@@ -267,7 +267,7 @@ class Diagram(Shown):
 
         graph = self.graph.copy()
         for i in range(1, len(self.branches)):
-            if self.branches[i].mirrored:  # it stands behind the branch that it is the image of
+            if self.branches[i].mirrored:  # it stands after the branch that it is the image of
                 graph.add_edge(i - 1, i)
         return len(graph) == 0 or bool(nx.is_connected(graph))
 
@@ -302,7 +302,7 @@ class Diagram(Shown):
         linestyles: Mapping[str, LineStyle] | None = None,
         inset: bool | tuple[float, float] = False,
     ) -> Axes:
-        """Draw one quantity of all branches with the bifurcations; behind them the points of a sweep.
+        """Draw one quantity of all branches with the bifurcations; after them the points of a sweep.
 
         ``names`` and ``colours`` say what branches are called in the legend, and their colours, by their
         signature's name; ``linestyles`` how ``"stable"``, ``"unstable"``, ``"unknown"`` parts and a

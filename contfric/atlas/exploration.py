@@ -32,7 +32,7 @@ _SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
 
 
 def _alike(one: Orbit, other: Orbit) -> bool:
-    """Tell whether two orbits are one motion: holds of other lengths may lead to the same stops."""
+    """Tell whether two orbits are one solution: holds of other lengths may lead to the same stops."""
     return one.outline.apart(other.outline) < SAME_MOTION
 
 
@@ -120,8 +120,8 @@ class Exploration:
         event = Event(bifurcation, [index], [bifurcation])
         self.events.append(event)
         if not bifurcation.located:
-            why = "not located: Newton fails behind this point"
-            self.judge(event, "go on behind the event", Verdict.REFUSED, why=why)
+            why = "not located: Newton fails after this point"
+            self.judge(event, "go on after the event", Verdict.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
 

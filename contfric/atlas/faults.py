@@ -12,7 +12,7 @@ from contfric.orbit.one_way import only_grows
 from contfric.orbit.repetition import shortest
 
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
-#: 300 times it where one of four periods is held beside a doubling.
+#: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
 #: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
 #: in at an event is longer than this share of the arclength.
@@ -95,7 +95,7 @@ def _is_symmetric(branch: Branch) -> bool:
 
 
 def _undetermined(branch: Branch) -> bool:
-    """Tell whether a narrow bridge ends where rounding leaves no place of the event in the whole range.
+    """Tell whether a narrow bridge ends where rounding leaves no location of the event in the whole range.
 
     Its equations are singular there. Such a bridge is one of many that a continuum of holds without damping
     seems to consist of: each begins and ends where rounding has it. A wide one is known by its points.
@@ -106,7 +106,7 @@ def _undetermined(branch: Branch) -> bool:
 
 
 def _violates(branch: Branch) -> bool:
-    """Tell whether a short branch violates one condition at all of its points behind the first.
+    """Tell whether a short branch violates one condition at all of its points after the first.
 
     Near a singular event conditions change by the square of the distance. A branch that leaves it on the
     wrong side violates them by less than the march notices, until another event ends it.
@@ -125,11 +125,11 @@ _FAULTS = (
     ),
     (
         _never_held,
-        "its hold has no length anywhere: the motion of another itinerary, that only touches rest",
+        "its hold has no length anywhere: the solution of another itinerary, that only touches rest",
     ),
     (
         _never_lasts,
-        "a segment of it has no length anywhere: the motion of another itinerary, that touches a surface",
+        "a segment of it has no length anywhere: the solution of another itinerary, that touches a surface",
     ),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_violates, "it violates a condition all along, by little more than rounding"),

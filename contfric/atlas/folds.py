@@ -3,7 +3,7 @@
 Where passages turn by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
 a candidate, over as many periods as at a sliding event. Elsewhere a hold of a symmetric bridge may still
 have an effect that is stationary in its length. There each of two symmetric holds may be shorter or longer,
-so that the bridge with one of either passes the same motion, and turns there as well.
+so that the bridge with one of either passes the same solution, and turns there as well.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def follow_arms(state: Exploration, event: Event) -> bool:
         many = count(arms.letters, length)
         if many > MOST_SEQUENCES or not beside:
             why = f"{many} sequences: more than {MOST_SEQUENCES} are not tried"
-            why = why if beside else "the arms were not found beside the fold"
+            why = why if beside else "the arms were not found next to the fold"
             state.judge(event, f"orbits of {length} units", Verdict.REFUSED, why=why)
             continue
         for sequence in necklaces(arms.letters, length):
@@ -118,7 +118,7 @@ def _try_arms(
         if point is not None:
             _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)
             return
-    state.judge(event, reason, Verdict.REFUSED, why="no admissible orbit beside the fold")
+    state.judge(event, reason, Verdict.REFUSED, why="no admissible orbit next to the fold")
 
 
 def _reason(arms: Arms, sequence: tuple[int, ...]) -> str:
@@ -175,7 +175,7 @@ def _add_crossing(
 def _add_one_sided(
     state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
 ) -> None:
-    """Trace a family away from its orbit at a fold, from a point beside it."""
+    """Trace a family away from its orbit at a fold, from a point next to it."""
     settings = settings_for(orbit, state.settings)
     if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
         point = point.reversed()

@@ -90,10 +90,10 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
     if any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests):
-        state.judge(event, "go on behind the event", Verdict.REFUSED, why=_INCOMPLETE)
+        state.judge(event, "go on after the event", Verdict.REFUSED, why=_INCOMPLETE)
         return
     if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):
-        reason, why = "go on behind the event", EndReason.CONTINUUM.value
+        reason, why = "go on after the event", EndReason.CONTINUUM.value
         state.judge(event, reason, Verdict.REFUSED, why=why)
         return
     active = orbit.model.index_of(state.settings.parameter)
@@ -147,7 +147,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             continue
         if only_grows(orbit.model, guess.itinerary):  # on its way to another orbit
             creeps.add(itinerary)
-            refused.setdefault(itinerary, f"no periodic motion is {show(guess.itinerary)}")
+            refused.setdefault(itinerary, f"no periodic solution is {show(guess.itinerary)}")
             continue
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if meets(e, event, settings)]

@@ -20,7 +20,7 @@ from contfric.orbit.solve import refine
 from contfric.orbit.system import Itinerary
 from contfric.signature import ReducedItinerary, canonical_itinerary
 
-#: Events whose parameters agree to their accuracy and whose motions agree to this are one.
+#: Events whose parameters agree to their accuracy and whose solutions agree to this are one.
 SAME_MOTION = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this (relative to 1 + their size).
 _SAME_ORBIT = 1e-8
@@ -93,7 +93,7 @@ def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> 
 def same_place(
     a: Bifurcation, b: Bifurcation, parameter: str, width: float, least: float = ACCURACY
 ) -> bool:
-    """Tell whether two events have the same parameters and the same motion (or its mirror image).
+    """Tell whether two events have the same parameters and the same solution (or its mirror image).
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     """Tell whether an orbit (or its mirror image) lies on a branch.
 
     Where the branch passes the orbit's parameter it is solved there and compared. The stops may be the same
-    in another order, or after holds of other lengths: the motions are compared as well.
+    in another order, or after holds of other lengths: the solutions are compared as well.
     """
     if orbit.periods != branch.system.periods or orbit.system.half != branch.system.half:
         return False

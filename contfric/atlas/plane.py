@@ -80,7 +80,7 @@ class Plane(Shown):
     curves : tuple of Curve
         Each once; one event of two itineraries (CS) is a curve of each.
     twins : tuple of int
-        For each curve the first one with the same motion: its own index if it is that.
+        For each curve the first one with the same solution: its own index if it is that.
     regions : tuple of Region
         Largest first.
     cells : ndarray, shape (n, n)

@@ -36,7 +36,7 @@ def is_known(
 ) -> int | None:
     """Return the index of the curve that a point lies on; None if on none.
 
-    Without ``same_itinerary`` the motions are compared, whatever their itineraries.
+    Without ``same_itinerary`` the solutions are compared, whatever their itineraries.
     """
     orbit = problem.orbit(point.joints, point.w)
     for index, curve in enumerate(curves):
@@ -110,7 +110,7 @@ def _solved_there(
 
 
 def twins_of(curves: list[Curve]) -> tuple[int, ...]:
-    """Return for each curve the first one of the same motions, in whatever itineraries."""
+    """Return for each curve the first one of the same solutions, in whatever itineraries."""
     found: list[int] = []
     for index, curve in enumerate(curves):
         part = max(curve.parts, key=lambda p: float(p.arc[-1] - p.arc[0]))

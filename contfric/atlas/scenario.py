@@ -4,7 +4,7 @@ At an event of the vector field's discontinuities (CS, SS, AS, GS) the branches 
 of the parameter value each. One below and one above: an orbit persists, with another signature. Two on one
 side and none on the other: they annihilate each other, as at a fold, without a vertical tangent (di Bernardo,
 Budd, Champneys, Kowalczyk 2008). One alone: no orbit is near on the other side, and motion jumps. Orbits
-with a hold, which no motion follows, do not count.
+with a hold, which no solution follows, do not count.
 """
 
 from __future__ import annotations

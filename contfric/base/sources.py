@@ -16,7 +16,7 @@ from contfric.base.resources import user_cache
 #: Text of a file whose code may be part of a kernel.
 _MARK = b"contfric.compiled"
 _ROOT = Path(__file__).parent.parent
-#: What came with a wheel next to the package: generated modules in it are none of its own.
+#: What came with a wheel next to the package: generated modules in it are not its own.
 _DATA = _ROOT / "_data"
 
 

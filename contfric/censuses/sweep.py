@@ -205,7 +205,7 @@ def sweep(  # type: ignore[no-untyped-def]
     periods : time to follow, in periods of the excitation
     joints, cycles, clocks, states : events of each trajectory, shapes (K, E, 2), (K, E), (K, E) and
         (K, E, n), as in :class:`contfric.orbit.simulation.EventRows`
-    outcome : number of events (-1: no start), mode behind the last one and how the simulation ended
+    outcome : number of events (-1: no start), mode after the last one and how the simulation ended
         (as in :mod:`contfric.orbit.trajectory`) of each, shape (K, 3)
     """
     count, n = starts.shape

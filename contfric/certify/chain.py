@@ -6,7 +6,7 @@ The unknowns are the joints ``z_i = (t_i, y_i)``, i = 0 .. N - 1; ``z_N`` is the
 
     (E w_i)_y - y_{i+1} = 0,        g w_{i+1} = 0       (g the row of the exit surface),
 
-and for a hold (a delayed release) the condition at its start in the place of the second one. Behind a reset R
+and for a hold (a delayed release) the condition at its start in the place of the second one. After a reset R
 the segment starts at ``R w_i``. From ``dE/dd = M E`` and ``a = W phi_t + I phi_y``, W the derivative of w_i
 by time, a disturbance phi of the joints changes the first by
 
@@ -84,7 +84,7 @@ def segments_of(system: System) -> Segments:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """One segment: its start w (behind a reset), what follows from it, and derivatives.
+    """One segment: its start w (after a reset), what follows from it, and derivatives.
 
     Attributes
     ----------

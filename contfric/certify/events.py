@@ -67,7 +67,7 @@ class EventCertificate(Shown):
     location : Location or None
         Its orbit on the shortest problem, and what vanishes there.
     zero : tuple of arb
-        The zero of the extended system: joints, what the event needs beside them, the parameter.
+        The zero of the extended system: joints, what the event needs next to them, the parameter.
     """
 
     event: Bifurcation
@@ -100,7 +100,7 @@ class EventCertificate(Shown):
         Raises
         ------
         ParameterError
-            If the event is not proved, or is none that the checker knows.
+            If the event is not proved, or is of a kind that the checker does not know.
         ResultFileError
             If the file cannot be written.
         """

@@ -135,7 +135,7 @@ def _iterated(sampled: Sampled, value: FloatArray, key: IntArray) -> tuple[Float
 def _crossings(
     sampled: Sampled, x: FloatArray, value: FloatArray, key: IntArray, window: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Return the intervals within a window whose images go from before it to behind it, or back."""
+    """Return the intervals within a window whose images go from before it to after it, or back."""
     margin = _BEYOND * sampled.period
     inside = (x > window[0]) & (x < window[1]) & (key >= 0)
     side = np.where(value < window[0] - margin, -1, np.where(value > window[1] + margin, 1, 0))

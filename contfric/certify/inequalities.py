@@ -213,7 +213,7 @@ def _at_joints(
 ) -> Iterator[Inequality]:
     model = chain.model
     for i, k, sign, where in system.layout.joint:
-        if where == 1:  # behind a reset
+        if where == 1:  # after a reset
             state = chain.move(int(i), joints).start
         else:
             after = joints[int(i) + 1]

@@ -42,7 +42,7 @@ class _Cycle:
 def as_zero_of(
     proof: EventCertificate, system: System, segments: Segments, build: Builder, near: Vector
 ) -> Vector | None:
-    """Return balls that hold the event's orbit as a solution (z, p) of a branch's chain; None if it is none.
+    """Return balls that hold the event's orbit as a solution (z, p) of a branch's chain; None if it is not.
 
     Parameters
     ----------

@@ -29,9 +29,7 @@ from contfric.models.balls.numbers import Vector
 
 def passes_once(segments: Segments, build: Builder, box: Box, sigma: int) -> bool:
     """Tell whether the Jacobian with sigma times the closure is singular at one orbit of a box at most."""
-    if box.tangent is None or any(
-        segments.resets
-    ):  # second derivatives behind resets are not known
+    if box.tangent is None or any(segments.resets):  # second derivatives after resets are not known
         return False
     square = squared(box.linear, sigma)
     edges = null_vectors(square[0])

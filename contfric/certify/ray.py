@@ -140,7 +140,7 @@ class Ray:
     # ------------------------------------------------------------------ a joint
 
     def _time(self, k: int) -> tuple[arb, arb, arb]:
-        """Return time of joint k at the middle, its change, and the ball of what is beside the chord."""
+        """Return time of joint k at the middle, its change, and the ball of what is next to the chord."""
         count = self.segments.count
         if k == count and self.segments.turn == 0.0:
             return self.values[k][0], arb(0), arb(0)
@@ -191,7 +191,7 @@ class Ray:
         return Affine(column(value), column(slope), column(rest), self.half)
 
     def _duration(self, i: int) -> tuple[arb, arb, arb]:
-        """Return the duration of a segment at the middle, its change, and what is beside the chord."""
+        """Return the duration of a segment at the middle, its change, and what is next to the chord."""
         first, last = self._time(i), self._time(i + 1)
         value = self.values[i + 1][0] - self.values[i][0]
         if self.segments.count == 1 and self.segments.turn != 0.0:

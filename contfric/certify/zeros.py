@@ -65,7 +65,7 @@ def _closed(row: Vector, closing: Closing) -> Vector:
 
 
 def at_start(segments: Segments, model: BallModel, i: int, rows: list[Vector]) -> list[Vector]:
-    """Return the rows that vanish where segment i starts: behind its reset, if there is one."""
+    """Return the rows that vanish where segment i starts: after its reset, if there is one."""
     return _behind(rows, model, segments.resets[i]) if segments.resets[i] else rows
 
 

@@ -7,7 +7,7 @@ ratio of means::
 
     lambda = sum G_i / sum T_i,     error^2 = sum (G_i - lambda T_i)^2 / (B (B - 1)) / (mean T_i)^2.
 
-Batches are longer than the memory of a chaotic motion, and so nearly independent (A. M. Law,
+Batches are longer than the memory of a chaotic solution, and so nearly independent (A. M. Law,
 "Simulation Modeling and Analysis", section 9.5.3). Where they are not, the same sum over pairs of
 batches is larger; the larger of the two is the error.
 """
@@ -160,7 +160,7 @@ def mean_rate(averages, k):  # type: ignore[no-untyped-def]
 def sign_of(averages, rate, error):  # type: ignore[no-untyped-def]
     """Return the sign of the largest rate, 0 if it is not certain.
 
-    A motion that leaves an orbit which repels weakly grows as steadily as can be, with no scatter
+    A solution that leaves an orbit which repels weakly grows as steadily as can be, with no scatter
     at all; so a positive sign also takes more growth than such a departure can have.
     """
     if rate > _SURE * error and rate * elapsed(averages) > _DEPARTED:
@@ -170,7 +170,7 @@ def sign_of(averages, rate, error):  # type: ignore[no-untyped-def]
 
 @helper
 def grows(averages):  # type: ignore[no-untyped-def]
-    """Tell whether the motion has become larger all the time, with no bound in sight."""
+    """Tell whether the solution has become larger all the time, with no bound in sight."""
     size, last = averages.size, averages.place[0] - 1
     if last + 1 < LEAST:
         return False

@@ -1,8 +1,8 @@
-"""Lyapunov exponents of many motions in one call, compiled.
+"""Lyapunov exponents of many solutions in one call, compiled.
 
-Each cell is one motion: parameters and an initial state. It is followed from joint to joint with the
+Each cell is one solution: parameters and an initial state. It is followed from joint to joint with the
 tangent map. It ends as soon as it has become periodic (:mod:`contfric.chaos.cycle`), is held or unbounded;
-otherwise its growth is averaged (:mod:`contfric.chaos.averaging`) over the periods behind a transient,
+otherwise its growth is averaged (:mod:`contfric.chaos.averaging`) over the periods after a transient,
 until the error is below the tolerance or the periods are over.
 """
 
@@ -69,7 +69,7 @@ BEFORE, AVERAGING, BEHIND = range(3)
 
 
 class Motions(NamedTuple):
-    """Where some motions are, one in each place.
+    """Where some solutions are, one in each place.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def new_motions(width, n, parameters):  # type: ignore[no-untyped-def]
 
 @helper
 def begin(motions, k, cell, start, y, p, limits, workspaces):  # type: ignore[no-untyped-def]
-    """Put a cell into place k of the motions; ``start`` is (mode, surfaces it is on, phase, period)."""
+    """Put a cell into place k of the solutions; ``start`` is (mode, surfaces it is on, phase, period)."""
     mode, on, phase, period = start
     motions.cell[k], motions.mode[k], motions.on[k] = cell, mode, on
     motions.live[k], motions.cycle[k], motions.joint[k] = y.shape[0], 0, 0
@@ -227,7 +227,7 @@ def follow_all(  # type: ignore[no-untyped-def]
     space,
     memory,
 ):
-    """Follow the motions of all cells; see :func:`follow_cells`."""
+    """Follow the solutions of all cells; see :func:`follow_cells`."""
     tables, starting, rows = by_reference(tables), by_reference(starting), by_reference(rows)
     motions, space, limits = by_reference(motions), by_reference(space), by_reference(limits)
     cells, width = states.shape[0], motions.mode.shape[0]
@@ -298,14 +298,14 @@ def follow_all(  # type: ignore[no-untyped-def]
 def follow_cells(  # type: ignore[no-untyped-def]
     functions, flow, tables, starting, time, vectors, states, limits, stop, rows
 ):
-    """Follow motions from ``states`` at ``time``, and fill the rows.
+    """Follow solutions from ``states`` at ``time``, and fill the rows.
 
     Some are followed side by side, segment by segment; where one ends the next cell takes its place. What a
     cell comes to does not depend on the others.
 
     Parameters
     ----------
-    flow : first hits of many motions at once
+    flow : first hits of many solutions at once
     vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
     stop : another thread writes a 1 to it when nobody waits for the rows any more
     """

@@ -33,7 +33,7 @@ from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 
-#: Bytes of a motion in a map beyond its exponents and its initial state.
+#: Bytes of a solution in a map beyond its exponents and its initial state.
 _BYTES = 24
 
 

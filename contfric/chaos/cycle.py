@@ -5,7 +5,7 @@ doubles from 64 on (R. P. Brent, BIT 20 (1980) 176-184). A later joint at the sa
 mode, at the same phase and state to within 1e-6, is a near return. The cycle between the two is then
 solved for by Newton's method with the tangent map M of the cycle, ``(1 - M) dz = P(z) - z``, and accepted
 if it returns to 1e-11 and attracts. (A near return of a chaotic motion leads to a cycle that repels, or
-nowhere; then the motion goes on, and the next return has to be ten times nearer.)
+nowhere; then the solution goes on, and the next return has to be ten times nearer.)
 
 The exponents of the cycle are ``ln|mu| / T`` with the eigenvalues mu of M over its period T. Of the
 smallest one that is not zero, which a matrix in floating point would lose next to a large one, the sum is
@@ -286,7 +286,7 @@ def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
 
 @helper
 def stands_still(functions, mode, p, cycle, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether hardly anything moves at the joint ``cycle.z``: a motion shrinks to an equilibrium."""
+    """Tell whether hardly anything moves at the joint ``cycle.z``: a solution shrinks to an equilibrium."""
     walk, z, still = cycle.walk, cycle.z, True
     n = walk.y.shape[0]
     functions.flow(mode, z[0], z[1:], 0.0, p, workspace.none, walk.end, walk.jac)

@@ -1,4 +1,4 @@
-"""How the following of a motion ends, and what is then written for it; compiled.
+"""How the following of a solution ends, and what is then written for it; compiled.
 
 A motion that becomes periodic, and one that is averaged, end in :mod:`contfric.chaos.cells`. Here are those
 that come to rest, that no surface cuts any more, and that have no exponents.
@@ -16,13 +16,13 @@ from contfric.orbit.cyclic import dense_solve
 from contfric.orbit.spectrum import spectrum
 from contfric.orbit.trajectory import HELD, IMPOSSIBLE, INFINITE, TOO_LARGE
 
-#: The motions, by their numbers in :class:`contfric.chaos.status.Motion`; 8 and 9 are given elsewhere.
+#: The solutions, by their numbers in :class:`contfric.chaos.status.Motion`; 8 and 9 are given elsewhere.
 PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)
 BROKEN, CHATTERS, UNCUT = range(10, 13)
-#: Periods (units of time without excitation) after which a motion that meets no surface any more is
+#: Periods (units of time without excitation) after which a solution that meets no surface any more is
 #: at rest, if it moves by less than this (relative) in one more.
 _SETTLES, _STILL = 1e4, 1e-9
-#: An equilibrium is corrected this often, by at most this (relative): the motion is near it.
+#: An equilibrium is corrected this often, by at most this (relative): the solution is near it.
 _CORRECTIONS, _NEARBY = 4, 1e-3
 #: An equilibrium that attracts, to the accuracy of its exponents.
 _ATTRACTS = 1e-8
@@ -61,7 +61,7 @@ def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignor
     filled = close_periods(averages, turns)
     if filled and not over:
         rate, error = mean_rate(averages, 0)
-        # a motion whose exponent is negative may yet converge
+        # a solution whose exponent is negative may yet converge
         over = error <= tolerance * rate and sign_of(averages, rate, error) > 0
     if over:
         write_means(averages, live, rows, cell)
@@ -171,7 +171,7 @@ def speed(functions, mode, t, p, walk, rows):  # type: ignore[no-untyped-def]
 
 @helper
 def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of an equilibrium that a motion starts on; tell whether it is one."""
+    """Write the exponents of an equilibrium that a solution starts on; tell whether it is one."""
     for mode in range(ranks.shape[0]):
         if tables.sliding[mode] == 0 and speed(functions, mode, t, p, walk, rows) == 0.0:
             write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell)
@@ -182,7 +182,7 @@ def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # 
 
 @helper
 def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write what a motion is that no surface cuts any more: at rest, of one period, or nothing."""
+    """Write what a solution is that no surface cuts any more: at rest, of one period, or nothing."""
     n, excited = walk.y.shape[0], walk.at_once[1] & 1 == 0
     functions.flow(mode, t, walk.y, _SETTLES * period, p, rows.turns[:0], walk.image, walk.jac[:0])
     for j in range(n):
@@ -204,7 +204,7 @@ def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows,
 
 @helper
 def write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write what a motion is that did not come to another joint."""
+    """Write what a solution is that did not come to another joint."""
     if outcome == HELD:  # in an autonomous model a rank counts no shift in time
         rank = ranks[mode] + (1 if walk.at_once[1] & 1 != 0 else 0)
         write_period(functions, rank, mode, t, p, period, walk, cycle, rows, cell)

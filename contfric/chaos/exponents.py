@@ -19,7 +19,7 @@ from contfric.models.tied import tied
 
 @dataclass(frozen=True, eq=False)
 class LyapunovExponents(Shown):
-    """The Lyapunov exponents of one motion, per unit of time.
+    """The Lyapunov exponents of one solution, per unit of time.
 
     Attributes
     ----------
@@ -32,12 +32,12 @@ class LyapunovExponents(Shown):
     errors : ndarray, shape (n,)
         Standard errors of averages; for a periodic orbit the error of its solution.
     motion : Motion
-        What the motion turned out to be, and what the exponents mean.
+        What the solution turned out to be, and what the exponents mean.
     periods : int
-        Period of a periodic motion, in periods of the excitation; 0 for others. Without excitation 1,
+        Period of a periodic solution, in periods of the excitation; 0 for others. Without excitation 1,
         and all other periods here are units of time.
     followed : int
-        Periods that the motion was followed.
+        Periods that the solution was followed.
     tolerance : float
         Relative error that was asked for.
 
@@ -127,7 +127,7 @@ def lyapunov_dimension(exponents: FloatArray) -> NDArray[np.float64]:
 
 
 def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> Limits:
-    """Return how long motions are followed, checked.
+    """Return how long solutions are followed, checked.
 
     Raises
     ------
@@ -166,9 +166,9 @@ def lyapunov_exponent(
     tolerance: float = 0.01,
     confirm: int = 0,
 ) -> LyapunovExponents:
-    """Compute the Lyapunov exponents of the motion from an initial state.
+    """Compute the Lyapunov exponents of the solution from an initial state.
 
-    They come from the exact tangent map of the event-driven flow. A motion that becomes periodic ends
+    They come from the exact tangent map of the event-driven flow. A solution that becomes periodic ends
     at once, with the exponents of its orbit, ``ln|multiplier| / period``; any other is averaged until
     the largest exponent is known to the tolerance.
 

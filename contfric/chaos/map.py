@@ -38,7 +38,7 @@ class LyapunovMap(Tabled):
     vector : ndarray, shape (parameters,)
         The parameters that do not vary.
     rows : TileRows
-        What each motion turned out to be; arrays begin with shape (len, len, starts).
+        What each solution turned out to be; arrays begin with shape (len, len, starts).
 
     Examples
     --------
@@ -70,16 +70,16 @@ class LyapunovMap(Tabled):
         """Number of initial states at each point."""
         return int(self.motions.shape[2])
 
-    # --------------------------------------------------------------------- every motion
+    # --------------------------------------------------------------------- every solution
 
     @property
     def exponents(self) -> FloatArray:
-        """All exponents of every motion, largest first, shape (len, len, starts, n)."""
+        """All exponents of every solution, largest first, shape (len, len, starts, n)."""
         return self.rows.exponents
 
     @property
     def errors(self) -> FloatArray:
-        """Error of the largest exponent of every motion, shape (len, len, starts)."""
+        """Error of the largest exponent of every solution, shape (len, len, starts)."""
         return self.rows.errors
 
     @property
@@ -89,12 +89,12 @@ class LyapunovMap(Tabled):
 
     @property
     def periods(self) -> NDArray[np.int32]:
-        """Periods of periodic motions, in periods of the excitation, 0 for others."""
+        """Periods of periodic solutions, in periods of the excitation, 0 for others."""
         return self.rows.periods
 
     @property
     def followed(self) -> NDArray[np.int32]:
-        """Periods that each motion was followed, shape (len, len, starts)."""
+        """Periods that each solution was followed, shape (len, len, starts)."""
         return self.rows.followed
 
     # --------------------------------------------------------------------- the grid
@@ -134,7 +134,7 @@ class LyapunovMap(Tabled):
         return self._of_largest(lyapunov_dimension(self.exponents))
 
     def where(self, *motions: Motion) -> NDArray[np.bool_]:
-        """Tell where any start leads to one of some motions, shape (len, len)."""
+        """Tell where any start leads to one of some solutions, shape (len, len)."""
         return np.asarray(np.isin(self.motions, [m.code for m in motions]).any(axis=2))
 
     @property
@@ -159,7 +159,7 @@ class LyapunovMap(Tabled):
         return np.asarray(several | (high - low > _DIFFERENT))
 
     def absent(self, missing: bool = False) -> NDArray[np.bool_]:
-        """Tell where no motion has an exponent, or (``missing``) where nothing was computed."""
+        """Tell where no solution has an exponent, or (``missing``) where nothing was computed."""
         lost = self.where(Motion.MISSING)
         return lost if missing else np.asarray(np.isnan(self.values) & ~lost)
 
@@ -169,14 +169,14 @@ class LyapunovMap(Tabled):
         return not bool(np.any(self.motions == Motion.MISSING.code))
 
     def counts(self) -> dict[Motion, int]:
-        """Return how many motions there are of each kind that occurs."""
+        """Return how many solutions there are of each kind that occurs."""
         found = np.bincount(self.motions.ravel(), minlength=len(Motion))
         return {motion: int(found[motion.code]) for motion in Motion if found[motion.code]}
 
     # --------------------------------------------------------------------- out
 
     def columns(self) -> Columns:
-        """Return one row for each motion: parameters, start, exponents, what it is."""
+        """Return one row for each solution: parameters, start, exponents, what it is."""
         first, second = self.axes
         index = np.indices(self.motions.shape).reshape(3, -1)
         n = self.exponents.shape[-1]

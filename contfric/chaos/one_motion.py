@@ -44,7 +44,7 @@ _FORGOTTEN = -math.log(np.finfo(np.float64).eps)
 def try_cycle(  # type: ignore[no-untyped-def]
     functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
 ):
-    """Solve for the cycle that the last joint seems to be on, and write what the motion is if it is."""
+    """Solve for the cycle that the last joint seems to be on, and write what the solution is if it is."""
     cycle, walk, state = workspaces.cycle, workspaces.walk, workspaces.state
     (mode, on, key, t), (joints, turns), n = at, back, walk.y.shape[0]
     cycle.z[0] = t
@@ -120,7 +120,7 @@ def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspa
 
 @helper
 def write_last(functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell):  # type: ignore[no-untyped-def]
-    """Write what a motion is that meets nothing any more, or breaks off."""
+    """Write what a solution is that meets nothing any more, or breaks off."""
     walk, cycle = workspaces.walk, workspaces.cycle
     if outcome == QUIET:
         write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell)

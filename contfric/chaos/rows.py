@@ -17,7 +17,7 @@ from contfric.orbit.tables import tables
 
 
 class Starting(NamedTuple):
-    """Where a motion starts, and how much its modes pass on.
+    """Where a solution starts, and how much its modes pass on.
 
     Attributes
     ----------
@@ -33,13 +33,13 @@ class Starting(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """How long motions are followed.
+    """How long solutions are followed.
 
     Attributes
     ----------
     transient, periods : periods before the growth is averaged, and most periods that it is averaged over
     tolerance : relative error of the largest exponent at which averaging ends
-    confirm : periods that a motion is followed further afterwards, whether it converges
+    confirm : periods that a solution is followed further afterwards, whether it converges
     """
 
     transient: int
@@ -107,7 +107,7 @@ def follow(
     vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
     time : initial time
     stop : shape (1,); another thread writes a 1 to it to end the computation, whose rows are then of no
-        use. Without it the motions are followed in a thread, and Ctrl-C ends them.
+        use. Without it the solutions are followed in a thread, and Ctrl-C ends them.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def new_stop() -> IntArray:
 
 
 def check_excited(model: Model, vector: FloatArray) -> None:
-    """Refuse a model without a period, where motions are compared at the same times.
+    """Refuse a model without a period, where solutions are compared at the same times.
 
     Raises
     ------
@@ -165,6 +165,6 @@ def check_excited(model: Model, vector: FloatArray) -> None:
     """
     if not model.view(vector).period > 0.0:
         raise ParameterError(
-            f"model '{model.name}' has no period of excitation: two motions are compared for models "
+            f"model '{model.name}' has no period of excitation: two solutions are compared for models "
             "that are excited periodically (lyapunov_exponent takes any model)"
         )

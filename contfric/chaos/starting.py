@@ -1,4 +1,4 @@
-"""In which mode a motion begins, compiled."""
+"""In which mode a solution begins, compiled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where motions start: the state given, one that depends on the parameters, or several."""
+"""Where solutions start: the state given, one that depends on the parameters, or several."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def default_states(model: Model, params: Mapping[str, float], count: int) -> Flo
 
 
 def number_of_starts(model: Model, state: StateLike | None, starts: int, example: object) -> int:
-    """Return how many motions start at each set of parameters.
+    """Return how many solutions start at each set of parameters.
 
     Raises
     ------

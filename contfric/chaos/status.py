@@ -1,4 +1,4 @@
-"""What a motion turned out to be."""
+"""What a solution turned out to be."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from contfric.base.tabled import Coded
 
 
 class Motion(Coded):
-    """What a motion turned out to be; the text says what its exponents mean.
+    """What a solution turned out to be; the text says what its exponents mean.
 
     The order is that of the numbers in the arrays of a :class:`~contfric.chaos.map.LyapunovMap`.
 
@@ -23,14 +23,16 @@ class Motion(Coded):
     CHAOTIC = "no period found, and the largest exponent is positive beyond doubt"
     SETTLING = "not periodic yet, but the largest exponent is negative beyond its error"
     UNDECIDED = "no period found, and the sign of the largest exponent is not certain"
-    HELD = "the motion ends at rest, for ever; the exponents are those of the rest position"
-    UNBOUNDED = "the motion grew with no bound in sight; there are no exponents"
-    NO_MOTION = "no motion starts there, or its events follow each other at once; no exponents"
+    HELD = "the solution ends at rest, for ever; the exponents are those of the rest position"
+    UNBOUNDED = "the solution grew with no bound in sight; there are no exponents"
+    NO_MOTION = "no solution starts there, or its events follow each other at once; no exponents"
     OUTSIDE = "the model is not defined at these parameters; there are no exponents"
     MISSING = "not computed: the map was interrupted"
-    BROKEN = "the integration of the motion or of its tangent broke off; there are no exponents"
+    BROKEN = "the integration of the solution or of its tangent broke off; there are no exponents"
     CHATTER = "impacts follow each other faster and faster, and motion does not go on; no exponents"
-    UNCUT = "the motion meets no surface any more and does not converge: the model needs a section"
+    UNCUT = (
+        "the solution meets no surface any more and does not converge: the model needs a section"
+    )
 
     @property
     def exact(self) -> bool:

@@ -14,11 +14,11 @@ and phi_d are the derivatives of phi)::
 
 The next segment starts where this one ends, so nothing has to be added at a switch: in the coordinates
 of the joint, time among them, the map is the product over the segments. (At a fixed time the same
-perturbation is ``dy - f dt`` with f the field before or behind the switch; the difference of the two is
+perturbation is ``dy - f dt`` with f the field before or after the switch; the difference of the two is
 the saltation matrix of P. C. Mueller, Chaos, Solitons & Fractals 5 (1995) 1671-1681, which is contained
 here.) The direction of the flow, ``(1, f)``, is mapped to zero: n directions are left of 1 + n.
 
-A reset R behind the joint maps the perturbation once more, ``(dt, R_t dt + R_y dy)``: the tangent map of an
+A reset R after the joint maps the perturbation once more, ``(dt, R_t dt + R_y dy)``: the tangent map of an
 impact, with its saltation. The time of an autonomous model is no coordinate: a shift in time is mapped to
 itself, with the exponent 0, and moves no state. It is left out (dt = 0), and n - 1 directions are left.
 
@@ -134,7 +134,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
     at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     for k in range(tables.flights.shape[0]):
-        if tables.flights[k] >= 0:  # behind a wall it may begin at rest on a section
+        if tables.flights[k] >= 0:  # after a wall it may begin at rest on a section
             on |= lying_on(functions, tables, t, y, p, workspace)
             break
     while True:
@@ -243,7 +243,7 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
 
 @helper
 def behind(functions, surface, t, p, frame, count, walk, workspace, reset):  # type: ignore[no-untyped-def]
-    """Carry the first rows of a frame behind a joint: over its reset, and without time if there is none."""
+    """Carry the first rows of a frame after a joint: over its reset, and without time if there is none."""
     if reset:
         functions.reset(surface, t, workspace.after, p, workspace.none, walk.end, walk.jac)
         apply_reset(frame, count, walk.jac, walk.image)

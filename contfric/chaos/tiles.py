@@ -57,7 +57,7 @@ class Tile(Task):
     ----------
     model : Model
     limits : Limits
-        How long motions are followed.
+        How long solutions are followed.
     vector : ndarray, shape (parameters,)
         The parameters that do not vary.
     varied : tuple of int
@@ -65,7 +65,7 @@ class Tile(Task):
     values : tuple of ndarray
         Their values in this tile, shapes (rows,) and (columns,).
     starts : int
-        Motions in each cell.
+        Solutions in each cell.
     states : ndarray or None
         Their initial states, shape (rows, columns, starts, n); None for the default ones.
     time : float

@@ -33,7 +33,7 @@ _BATCHES = 20
 
 @dataclass(frozen=True)
 class TwoOrbitEstimate:
-    """The mean rate at which two motions separate, and its standard error from batch means."""
+    """The mean rate at which two solutions separate, and its standard error from batch means."""
 
     value: float
     error: float
@@ -41,7 +41,7 @@ class TwoOrbitEstimate:
 
 @dataclass(eq=False)
 class _Rider:
-    """A motion that is followed from instant to instant."""
+    """A solution that is followed from instant to instant."""
 
     model: Model
     vector: FloatArray
@@ -50,7 +50,7 @@ class _Rider:
     mode: str
 
     def ride(self, until: float, period: float) -> None:
-        """Follow the motion to an instant."""
+        """Follow the solution to an instant."""
         mode = self.model.mode_index[self.mode]
         periods = (until - self.time) / period
         # from within a segment: it lies on no surface that it could leave
@@ -76,7 +76,7 @@ def two_orbit_estimate(
     transient: int = 100,
     distance: float = 1e-8,
 ) -> TwoOrbitEstimate:
-    """Estimate the largest Lyapunov exponent from two motions a small distance apart.
+    """Estimate the largest Lyapunov exponent from two solutions a small distance apart.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ from contfric.orbit.trajectory import (
 
 
 class CellWorkspaces(NamedTuple):
-    """All workspace of some motions, with one more axis before the others; or of one of them."""
+    """All workspace of some solutions, with one more axis before the others; or of one of them."""
 
     walk: Walk
     state: StateWorkspace
@@ -45,7 +45,7 @@ class CellWorkspaces(NamedTuple):
 
 @allocating_helper
 def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
-    """Return the workspace for so many motions of n states."""
+    """Return the workspace for so many solutions of n states."""
     walk, state, memory, averages = new_walk(n), state_workspace(n), new_memory(n), new_averages(n)
     return CellWorkspaces(
         Walk(
@@ -91,7 +91,7 @@ def as_many(width, array):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def place(space, k):  # type: ignore[no-untyped-def]
-    """Return the workspace of the motion in place k."""
+    """Return the workspace of the solution in place k."""
     walk, state, memory, averages = space.walk, space.state, space.memory, space.averages
     return CellWorkspaces(
         Walk(
@@ -129,5 +129,5 @@ def place(space, k):  # type: ignore[no-untyped-def]
 
 @helper
 def words_for(space):  # type: ignore[no-untyped-def]
-    """Return how many whole numbers the references to the workspace of one motion take."""
+    """Return how many whole numbers the references to the workspace of one solution take."""
     return words_of(place(by_reference(space), 0))

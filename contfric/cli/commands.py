@@ -141,7 +141,7 @@ def _draw_graph(model: Model, path: Path) -> None:
     formats = (".png", ".svg", ".pdf")
     if path.suffix.lower() not in formats:
         raise ResultFileError(
-            f"cannot draw to '{path}': its ending is none of {', '.join(formats)}"
+            f"cannot draw to '{path}': its ending is not one of {', '.join(formats)}"
         )
     from contfric.plot.graph import plot_transition_graph
     from contfric.plot.save import new_figure, save_figure

@@ -195,7 +195,7 @@ def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add("--domain", help="initial domain, where the state alone does not decide")
     add("--periods", type=_number, default=100.0, help="excitation periods (%(default)s)")
     add("--events", type=_count, default=1_000_000, help="most events to follow (%(default)s)")
-    add("--find", action="store_true", help="say on stderr what the motion converges to")
+    add("--find", action="store_true", help="say on stderr what the solution converges to")
 
 
 def _fill_census(parser: argparse.ArgumentParser) -> None:

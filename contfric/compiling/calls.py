@@ -1,6 +1,6 @@
 """Calls of compiled functions by their addresses: an array goes as its data and its shape.
 
-Numba hands an array over as seven words or more (who owns it, its size, strides). Behind an address there is
+Numba hands an array over as seven words or more (who owns it, its size, strides). After an address there is
 a wrapper, which gets all of them on the stack and copies them there once more for the function: 40 words
 for the level of a surface, in pairs that the processor cannot forward from the stores before. That took
 twice as long as the short functions of a model themselves. All arrays here are contiguous numbers that the

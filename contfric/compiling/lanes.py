@@ -1,4 +1,4 @@
-"""Numbers of several motions in one vector of the processor: a type for compiled code.
+"""Numbers of several solutions in one vector of the processor: a type for compiled code.
 
 Loops are compiled as they stand, and not put into vectors (:mod:`contfric.compiled`); a search of roots is no
 loop that a compiler would find, either. ``Lanes`` holds a number of each of :data:`LANES` motions. Arithmetic

@@ -1,4 +1,4 @@
-"""Memory behind a pointer in compiled code: as an array, and with a lock where several threads run."""
+"""Memory after a pointer in compiled code: as an array, and with a lock where several threads run."""
 
 from __future__ import annotations
 

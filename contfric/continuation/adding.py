@@ -228,7 +228,7 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
     """Return the orbit of an itinerary at a parameter.
 
     Newton alone may take the wrong root where a stick of a turn is short: its load falls through the
-    limit before it grows through it. So the joints are first those of the motion itself.
+    limit before it grows through it. So the joints are first those of the solution itself.
     """
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(parameter)] = value
@@ -236,7 +236,7 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
 
 
 def _settled(orbit: Orbit) -> Orbit:
-    """Return an orbit with the joints of the motion that takes its outcomes, after some rounds."""
+    """Return an orbit with the joints of the solution that takes its outcomes, after some rounds."""
     joints, end, system = orbit.joints.copy(), np.empty(orbit.joints.shape[1]), orbit.system
     found = follow_itinerary(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)
     return replace(orbit, joints=joints) if found else orbit

@@ -72,11 +72,11 @@ def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
 
 @dataclass(frozen=True, eq=False)
 class Arms:
-    """The motion at a fold, and its two arms at one value of the parameter near it.
+    """The solution at a fold, and its two arms at one value of the parameter near it.
 
     Attributes
     ----------
-    unit : the shortest part that the motion consists of
+    unit : the shortest part that the solution consists of
     fold : the orbit of one unit at the fold
     turning : the holds of the unit whose passages turn
     as_one : the unit turns as a whole, all of its passages together
@@ -118,7 +118,7 @@ class Arms:
         return replace(self, longer=longer, shorter=shorter)
 
     def at_fold(self, count: int) -> Orbit:
-        """Return the motion at the fold as an orbit of several units."""
+        """Return the solution at the fold as an orbit of several units."""
         return self._repeated(self.fold, count)
 
     def orbit(self, sequence: tuple[int, ...]) -> Orbit:

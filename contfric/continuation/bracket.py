@@ -49,7 +49,7 @@ _SHORTEST = 4e-16
 #: Widest share of a step that the rounding of an integrated flow may be (in steps that are hardly longer).
 _COARSEST = 0.01
 #: Share of a step below which it is not narrowed down any further where Newton is lost: the multiplier that
-#: is sought is behind that.
+#: is sought is after that.
 _LOST = 1e-6
 
 
@@ -229,7 +229,7 @@ def locate(problem, sought, kinked, points, counts):  # type: ignore[no-untyped-
     -------
     (float, bool)
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
-        position of the last good point if it is Newton that fails behind it. And, for a label, whether
+        position of the last good point if it is Newton that fails after it. And, for a label, whether
         all trials were solved and had that of one of the points: then it changes at one place only, as far
         as is seen.
     """

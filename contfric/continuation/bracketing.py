@@ -117,7 +117,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         Returns
         -------
         tuple
-            (position in the step, value there, whether trials fail behind it or go over to another sheet,
+            (position in the step, value there, whether trials fail after it or go over to another sheet,
             whether any did not).
         """
         way, points = by_reference(way), by_reference(points)

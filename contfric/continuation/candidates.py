@@ -74,7 +74,7 @@ def sequences_of(
     Parameters
     ----------
     active : index of the parameter that varies; without it local conditions are not asked
-    most_periods : longest orbit; the shortest period of the motion at least
+    most_periods : longest orbit; the shortest period of the solution at least
     held : whether orbits with holds are candidates; those that are not are said to be refused
     """
     for refusal in incident.refusals:
@@ -154,7 +154,7 @@ def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> s
 
 
 def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArray | None]:
-    """Return the same motion as an orbit of the edited itinerary, on its half if it is symmetric.
+    """Return the same solution as an orbit of the edited itinerary, on its half if it is symmetric.
 
     And how its joints move away from the event, shape (N, 1 + n), where it is singular there.
 

@@ -1,6 +1,6 @@
 """What follows an event of a structure with many contacts, where nothing jumps.
 
-The states of the contacts compose, so that the itinerary behind an event follows from that before it. Where
+The states of the contacts compose, so that the itinerary after an event follows from that before it. Where
 rest is left without acceleration (:attr:`contfric.models.definition.Model.filippov`) the solution is
 continuous, and there are four cases:
 
@@ -97,7 +97,7 @@ def _sharing(
         edit = in_other_order(model, itinerary, i, surface, count)
         reason = f"{surface} is met before {itinerary[i][1]} at the end of segment {i + 1}"
     if edit.inserted and not edit.dropped and not _lasts(orbit, i):
-        raise NotationError(f"segment {i + 1} has no length: nothing comes in behind it")
+        raise NotationError(f"segment {i + 1} has no length: nothing comes in after it")
     used = len(edit.inserted.get(i, ()))
     return edit, {key: joint for key, joint in joints.items() if key[1] < used}, {}, reason
 
@@ -118,7 +118,7 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
 
 
 def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
-    """Return the mode behind a surface, and the surface that leads back from there."""
+    """Return the mode after a surface, and the surface that leads back from there."""
     for other in model.targets.get((mode, surface), ()):
         for back, target in model.exits_of(other):
             if target == mode:

@@ -1,7 +1,7 @@
 """Continua: where the orbits at one value of the parameter are a family, and not isolated.
 
 At Omega = 1/2 and without damping a slide lasts a whole natural period whatever its amplitude, so that a
-motion without sticks leaves its amplitude free. Such a family is met in two ways.
+solution without sticks leaves its amplitude free. Such a family is met in two ways.
 
 * The branch **is** the family: the parameter is constant along it, and its slope is rounding.
 * The branch **passes through** one family after the other: a multiplier is 1 at every point, and the

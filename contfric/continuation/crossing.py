@@ -263,7 +263,7 @@ def crossing_between(
 
 
 def crossing_point(crossing: Crossing, before: Point, arc: float, settings: Settings) -> Point:
-    """Return the point of a branch at a branch point, an arclength behind another of its points."""
+    """Return the point of a branch at a branch point, an arclength after another of its points."""
     direction = crossing.nearest(before.tangent, before.slope, settings.scale)
     orbit = crossing.orbit
     mu = np.zeros_like(before.mu)

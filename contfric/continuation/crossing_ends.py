@@ -35,7 +35,7 @@ def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale
 def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray | None:
     """Return the joints of a point, turned so that those of another one are next to an orbit's.
 
-    A branch may begin with another segment of the same motion, and in another period.
+    A branch may begin with another segment of the same solution, and in another period.
     """
     itinerary, wanted = branch.system.itinerary, orbit.system.itinerary
     if len(itinerary) != len(wanted) or branch.system.half:

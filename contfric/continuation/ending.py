@@ -204,13 +204,13 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         return (
             ""
             if kind is Kind.SS
-            else f"{kind.meaning}: the signature changes, the motion is continuous"
+            else f"{kind.meaning}: the signature changes, the solution is continuous"
         )
     for place in places_of(bifurcation)[:1]:
         try:
             outcome_at(orbit.as_whole(), place, kind)
         except NoJump:
-            return f"{kind.meaning}: the signature changes, the motion is continuous"
+            return f"{kind.meaning}: the signature changes, the solution is continuous"
         except NotationError:
             return ""
     return ""

@@ -86,7 +86,7 @@ _MEANINGS = {
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 
-#: The motion at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
+#: The solution at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
 _SYMMETRIC = 1e-7
 
 
@@ -102,7 +102,7 @@ class EndReason(str, Enum):
 
     RANGE = "end of the range asked for"
     LIMIT = "physical limit of the parameter"
-    CS = "crossing-sliding: the signature changes, the motion is continuous"
+    CS = "crossing-sliding: the signature changes, the solution is continuous"
     SS = "switching-sliding: the Poincare map is discontinuous"
     AS = "adding-sliding: the Poincare map is discontinuous"
     GS = "grazing-sliding: the Poincare map is discontinuous"
@@ -232,7 +232,7 @@ class Bifurcation(MeasuredEvent):
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether the motion at the event is its own mirror image, whatever the itineraries that meet."""
+        """Whether the solution at the event is its own mirror image, whatever the itineraries that meet."""
         if self.orbit.symmetric:
             return True
         if self.orbit.model.symmetry is None:
@@ -241,7 +241,7 @@ class Bifurcation(MeasuredEvent):
 
     @property
     def outline(self) -> Outline:
-        """The slides of the motion at the event, whatever itinerary it was reached with."""
+        """The slides of the solution at the event, whatever itinerary it was reached with."""
         return self.orbit.outline
 
     @property

@@ -201,9 +201,9 @@ def _is_idle(orbit: Orbit, before: Point, point: Point, after: Point, settings: 
 def not_located(
     orbit: Orbit, kind: Kind, before: Point, beyond: Point, settings: Settings
 ) -> Located:
-    """Return an event that is known to lie behind a point, and no better: it is not kept silent.
+    """Return an event that is known to lie after a point, and no better: it is not kept silent.
 
-    Its bound is that of an event at the point, and as much again for the way behind it.
+    Its bound is that of an event at the point, and as much again for the way after it.
     """
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)

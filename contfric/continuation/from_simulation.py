@@ -29,7 +29,7 @@ from contfric.signature import canonical_itinerary
 _BESIDE = (1e-7, 1e-5, 1e-3)
 #: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
 _LONGER = 1.2
-#: Where in a segment motions may start: odd shares, no two of them symmetric to its middle.
+#: Where in a segment solutions may start: odd shares, no two of them symmetric to its middle.
 _PLACES = np.array([0.17, 0.26, 0.37, 0.44, 0.52, 0.61, 0.70, 0.79])
 #: A surface that the state leaves by less than this all along (rounding of states of order 1) is lain on.
 _LEFT = 1e-9
@@ -38,7 +38,7 @@ _LEFT = 1e-9
 def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
     """Yield orbits, not solved, with the itineraries of solutions near an orbit over one turn.
 
-    The same itinerary may come again, as a guess from a motion farther away.
+    The same itinerary may come again, as a guess from a solution farther away.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator
 def _inside(orbit: Orbit) -> tuple[int, float]:
     """Return the longest segment that does not rest, and a time of it at which no surface is near.
 
-    Its middle will not do: by symmetry, or behind a touch, it may be a stationary point.
+    Its middle will not do: by symmetry, or after a touch, it may be a stationary point.
     """
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     resting = resting_modes(orbit)
@@ -102,7 +102,7 @@ def _beside(
 def _one_turn(
     orbit: Orbit, start: tuple[int, float], vector: FloatArray, state: FloatArray
 ) -> Orbit | None:
-    """Follow a motion for one turn; return the orbit that it nearly is, None if it breaks off."""
+    """Follow a solution for one turn; return the orbit that it nearly is, None if it breaks off."""
     model, (i, time) = orbit.model, start
     mode = model.mode_index[_declared(orbit, i, time, state)]
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
@@ -129,7 +129,7 @@ def _one_turn(
 def _end_of_turn(
     orbit: Orbit, trajectory: Trajectory, start: tuple[int, float], unit: float
 ) -> int | None:
-    """Return the number of events of one turn; None if the motion is in another mode after it."""
+    """Return the number of events of one turn; None if the solution is in another mode after it."""
     model, itinerary = orbit.model, trajectory.itinerary
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
     i, time = start
@@ -140,7 +140,7 @@ def _end_of_turn(
 
 
 def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
-    """Return the mode, as it was declared, that a motion near segment i is in."""
+    """Return the mode, as it was declared, that a solution near segment i is in."""
     model, mode = orbit.model, orbit.itinerary[i][0]
     if mode not in model.joined:
         return mode

@@ -1,4 +1,4 @@
-"""All itineraries that the motion at an event solves: its regular outcomes, and those that are held.
+"""All itineraries that the solution at an event solves: its regular outcomes, and those that are held.
 
 At an event one motion solves the equations of several itineraries. The itineraries differ at **places** of
 the motion only: a stop on the limit, a touch inside of a stick, a stop without acceleration, a touch of rest
@@ -68,7 +68,7 @@ class Name:
 
 @dataclass(frozen=True, eq=False)
 class Incident:
-    """The unit of the motion at an event, its forms, and the outcomes that are rejected.
+    """The unit of the solution at an event, its forms, and the outcomes that are rejected.
 
     ``names`` say what the step from one form to another is called; margins below ``least`` count as zero.
     """
@@ -82,7 +82,7 @@ class Incident:
 
 
 def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
-    """Return all forms of the motion at a sliding event.
+    """Return all forms of the solution at a sliding event.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
 
 
 def _moves(orbit: Orbit) -> bool:
-    """Tell whether a motion has a slide of some length: in less the mass moves by the cube of it.
+    """Tell whether a solution has a slide of some length: in less the mass moves by the cube of it.
 
     Where one mass rests others are free to move, and may rest as well.
     """
@@ -132,7 +132,7 @@ def _moves(orbit: Orbit) -> bool:
 def _started(orbit: Orbit, unit: Unit, least: float) -> _Collection:
     """Return a collection with the forms of the branch that arrives.
 
-    Where its motion repeats itself to rounding only, the whole orbit is the unit.
+    Where its solution repeats itself to rounding only, the whole orbit is the unit.
     """
     collection = _Collection(unit, least)
     try:

@@ -17,7 +17,7 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
                                                    CS where there is no rest that the surface ends, and GS
                                                    where one of the two is the zero of the other's rate;
                                                    as the interior where a section is touched
-entry      behind a reset the state is on another  CS: another mode follows
+entry      after a reset the state is on another  CS: another mode follows
            surface
 lasting    slide between two holds                 GS: the first can be left no more
 =========  ======================================  ==========================================
@@ -44,13 +44,13 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, System, Test, inside_sign
 from contfric.signature.holds import ends_rest
 
-#: A slide behind a hold that is this short has vanished where one of its margins has: they are its length
+#: A slide after a hold that is this short has vanished where one of its margins has: they are its length
 #: times a rate of the load, and Newton may fail before they are below 1e-5.
 _VANISHED = 1e-3
 #: A load that changes this slowly at a stop stands still there: a stop at a minimum is known to the root of
 #: rounding. Where it changes faster, a stick as short as its rate still ends in a jump.
 ROUNDED = 1e-6
-#: Time, in periods, by which it is asked before and behind a stop whether it turns there.
+#: Time, in periods, by which it is asked before and after a stop whether it turns there.
 _LATER = 1e-4
 
 
@@ -80,7 +80,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
 
 
 def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
-    """Return the hold that a margin belongs to: its own, or of the slide behind it that has vanished."""
+    """Return the hold that a margin belongs to: its own, or of the slide after it that has vanished."""
     for hold in orbit.system.holds:
         if test.segment == hold.segment:
             return hold
@@ -102,7 +102,7 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
     if test.margin is Margin.HELD:
         return Kind.GS
     if test.margin is Margin.LASTING and test.segment != hold.segment:
-        return Kind.GS  # the slide behind it has vanished
+        return Kind.GS  # the slide after it has vanished
     if hold.pin is not None:
         return Kind.SS
     return Kind.AS if hold.after_rest else Kind.GS
@@ -123,7 +123,7 @@ def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
 def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
     """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
 
-    A load that stands still at the stop grows behind it where it has its minimum: a stick around the minimum
+    A load that stands still at the stop grows after it where it has its minimum: a stick around the minimum
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
     """
     rate = outward_rate(system, test, orbit)
@@ -135,7 +135,7 @@ def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
 
 
 def bends_outward(orbit: Orbit, mode: str, surface: str, inside: int, joint: FloatArray) -> bool:
-    """Tell whether a load that stands still at its limit is beyond it before and behind that.
+    """Tell whether a load that stands still at its limit is beyond it before and after that.
 
     ``inside`` is the sign of the surface within it.
     """

@@ -17,7 +17,7 @@ def locate_events(
 ) -> list[tuple[Bifurcation, Point]]:
     """Return the bifurcations between two points with their located points, in order.
 
-    A point that is ``lost`` is no event: Newton fails behind it before any condition is violated.
+    A point that is ``lost`` is no event: Newton fails after it before any condition is violated.
     """
     sliding = sliding_events(orbit, before, after, settings)
     if not sliding:

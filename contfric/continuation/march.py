@@ -99,7 +99,7 @@ def accepted_share(way, points, k, length, step):  # type: ignore[no-untyped-def
 
 @helper
 def following_step(way, z, angle, step, largest):  # type: ignore[no-untyped-def]
-    """Return the step behind an accepted point, from the angle between its tangent and the last one."""
+    """Return the step after an accepted point, from the angle between its tangent and the last one."""
     factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
     size = largest_state(z)
     if way.layout.turn == 0.0:  # the duration is one of the unknowns

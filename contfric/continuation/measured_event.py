@@ -43,7 +43,7 @@ class MeasuredEvent(Shown):
         names = [law.name for law in laws_of(model)]
         ends = [
             (name, (f"{name}+", f"{name}-")) for name in names
-        ]  # limits have more behind the sign
+        ]  # limits have more after the sign
         return tuple(
             name
             for name, own in ends

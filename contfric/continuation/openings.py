@@ -47,7 +47,7 @@ def with_openings(branch: Branch, settings: Settings) -> Branch:
 
 
 def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurcation | None:
-    """Return the event in the step behind a point; None where the sign changes through a pole."""
+    """Return the event in the step after a point; None where the sign changes through a pole."""
     active = branch.model.index_of(branch.parameter)
     settings = replace(settings, stability=False)
     low, high = 0.0, 1.0
@@ -77,7 +77,7 @@ def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurca
 
 
 def _between(branch: Branch, k: int, share: float, active: int, settings: Settings) -> Orbit | None:
-    """Return the orbit at a share of the step behind a point, solved normal to the chord."""
+    """Return the orbit at a share of the step after a point, solved normal to the chord."""
     chord = branch.joints[k + 1] - branch.joints[k]
     slope = float(branch.values[k + 1] - branch.values[k])
     vector = branch.vector.copy()

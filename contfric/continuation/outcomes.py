@@ -1,6 +1,6 @@
 """What can follow a sliding event at one place of an orbit: the edit of its itinerary, and why.
 
-The motion at the event is known, so the local structure of each outcome can be derived from it
+The solution at the event is known, so the local structure of each outcome can be derived from it
 (``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
 
 =====================================  ========================================================
@@ -11,13 +11,13 @@ SS, followed by a reversal             insert a hold of length zero, pinned to F
 SS, followed by a stick                the stick becomes a hold pinned to F
 GS, an impact is grazed inside         split it there: an impact of speed zero
 GS, an impact has no speed any more    drop it: the segment goes on
-AS, a stick is released tangentially   insert a hold of length zero behind it
+AS, a stick is released tangentially   insert a hold of length zero after it
 AS, a stick touches F inside           split it there: a hold goes on
 GS, a slide touches rest inside        split it there: insert a hold of length zero
-GS, a slide stops tangentially         the stick behind it becomes a hold
+GS, a slide stops tangentially         the stick after it becomes a hold
 a hold has no length any more          drop it: the regular orbit with the earlier outcome
 a hold reaches its regular release     it becomes a stick: the regular orbit with the later outcome
-a hold is left without acceleration    the slide behind it is gone: the stick behind that takes over
+a hold is left without acceleration    the slide after it is gone: the stick after that takes over
 a hold touches F on its way            its pin moves to the touch
 the stick up to that touch vanishes    the hold is pinned to the stop
 a hold can just not be left inside     split it there: a slide and a second hold
@@ -88,7 +88,7 @@ class RestsForEver(NotationError):
 
 
 class NoJump(NotationError):
-    """Nothing can be held at an event: the motion there is continuous."""
+    """Nothing can be held at an event: the solution there is continuous."""
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
     i, (mode, exit_) = place.segment, orbit.itinerary[place.segment]
     _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
-    reason = f"hold behind the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
+    reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
@@ -194,7 +194,7 @@ def _pinned_at_stop(orbit: Orbit, place: Test) -> Outcome:
     """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
     i, surface = place.segment, orbit.itinerary[place.segment][1]
     edit = Edit(frozenset({i}), {(i + 1) % len(orbit.itinerary): hold_at(surface)})
-    return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold behind it starts at the stop")
+    return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold after it starts at the stop")
 
 
 def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
@@ -205,7 +205,7 @@ def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
     touch = touch_of(orbit, i, place.surface)
     departs = _released(model, mode, place.surface)
     _check_held(orbit, mode, departs, touch)
-    reason = f"hold behind the touch of {place.surface} in stick {i + 1}"
+    reason = f"hold after the touch of {place.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
         left = (departs, left_surface(model, mode, departs))
@@ -310,12 +310,12 @@ def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[
 
 
 def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
-    """Return the outcome where the slide behind a hold has vanished: the rest behind it takes over."""
+    """Return the outcome where the slide after a hold has vanished: the rest after it takes over."""
     itinerary, count = orbit.itinerary, len(orbit.itinerary)
     slide, rest = (h + 1) % count, (h + 2) % count
     if not orbit.model.lies_on(itinerary[rest][0], itinerary[slide][1]):
-        raise NotationError(f"the slide behind hold {h + 1} vanishes, and no rest follows it")
-    reason = f"the slide behind hold {h + 1} vanishes: it is held"
+        raise NotationError(f"the slide after hold {h + 1} vanishes, and no rest follows it")
+    reason = f"the slide after hold {h + 1} vanishes: it is held"
     if rest in (h, (h - 1) % count):
         raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
     if itinerary[rest][1] == TOUCH:  # two holds become one
@@ -324,7 +324,7 @@ def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
 
 
 def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
-    """Return the outcome where a hold touches its limit: a stick to there, and the hold behind it."""
+    """Return the outcome where a hold touches its limit: a stick to there, and the hold after it."""
     h = place.segment
     touch = touch_of(orbit, h, place.surface)
     reason = f"hold {h + 1} touches {place.surface}: its pin moves there"
@@ -349,7 +349,7 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     mode, exit_ = itinerary[i]
     if thrown_at(orbit, place):
         raise NotationError(
-            f"behind the reset at {place.surface} motion starts somewhere else: no orbit is near"
+            f"after the reset at {place.surface} motion starts somewhere else: no orbit is near"
         )
     if place.margin is Margin.INTERIOR:
         edit = split(i, place.surface, (mode, exit_))
@@ -359,9 +359,9 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
     whole = orbit.model.whole_mode
     if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(
-            f"the impact behind segment {i + 1} changes the mode: it cannot be left out"
+            f"the impact after segment {i + 1} changes the mode: it cannot be left out"
         )
-    reason = f"no impact on {place.surface} behind segment {i + 1}"
+    reason = f"no impact on {place.surface} after segment {i + 1}"
     if (
         itinerary[behind] in orbit.model.sections
     ):  # its mode says from which side the section is crossed

@@ -42,7 +42,7 @@ _LEAST_STEP = 1e-8
 _RESOLVED = 1e9
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
-#: Extra columns of the tests behind the margins and the distances of the labels; the first is the slope
+#: Extra columns of the tests after the margins and the distances of the labels; the first is the slope
 #: of the parameter. (Repeated
 #: from the compiled steps, which are not imported before something is traced; a test compares them.)
 EXTRA = 4
@@ -113,7 +113,7 @@ class Point:
     tangent, direction : the unit tangent, of the joints and of the parameters
     tests, labels, mu : what is watched
     arc : arclength
-    lost : whether Newton fails behind it before what is sought is reached
+    lost : whether Newton fails after it before what is sought is reached
     rough : whether that is reached to the root of rounding only
     """
 

@@ -119,7 +119,7 @@ def _interval(
 
 @dataclass(frozen=True)
 class _Release:
-    """The motion from a release to the next, with the outcomes of either orbit."""
+    """The solution from a release to the next, with the outcomes of either orbit."""
 
     letters: dict[str, Orbit]
     bridge: Branch

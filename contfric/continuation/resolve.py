@@ -100,7 +100,7 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
 
 
 def _is_beyond(point: Point, limit: Point, step: float, settings: Settings) -> bool:
-    """Tell whether an event lies at the limit of the parameter, or behind it."""
+    """Tell whether an event lies at the limit of the parameter, or after it."""
     within = settings.low <= point.value <= settings.high
     return point.arc > limit.arc - _AT_LIMIT * step or not within
 

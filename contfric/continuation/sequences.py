@@ -23,7 +23,7 @@ def lengths(periods: int, half: bool, most_periods: int) -> list[int]:
 
     Parameters
     ----------
-    periods : shortest period of the motion
+    periods : shortest period of the solution
     half : whether the unit is half of it
 
     Examples

@@ -18,7 +18,7 @@ from contfric.signature.edits import Edit
 
 
 def limit_behind(model: ComposedModel, itinerary: Itinerary, i: int, surface: str) -> Limit | None:
-    """Return the limit of a shared load that is met behind a joint; None if it is no such thing."""
+    """Return the limit of a shared load that is met after a joint; None if it is no such thing."""
     limit = model.composition.limit(surface)
     return None if limit is None or surface in model.composition.ways(itinerary[i][0]) else limit
 
@@ -26,11 +26,11 @@ def limit_behind(model: ComposedModel, itinerary: Itinerary, i: int, surface: st
 def with_other_state(
     model: ComposedModel, itinerary: Itinerary, i: int, limit: Limit, vanishes: bool
 ) -> tuple[Edit, str]:
-    """Return the edit where a contact has the other state behind a joint, and why.
+    """Return the edit where a contact has the other state after a joint, and why.
 
     Parameters
     ----------
-    vanishes : whether the segment behind the joint has no length
+    vanishes : whether the segment after the joint has no length
     """
     n, name = len(itinerary), limit.contact.name
     (mode, exit_), (here, leaves), after = (
@@ -50,7 +50,7 @@ def with_other_state(
         ), f"'{name}' changes its state at joint {i + 1} already"
     if not model.follows(other, back, here):
         raise NotationError(f"'{here}' cannot follow '{other}' at {back}")
-    return Edit(inserted={i: ((other, back),)}), f"'{name}' changes its state behind joint {i + 1}"
+    return Edit(inserted={i: ((other, back),)}), f"'{name}' changes its state after joint {i + 1}"
 
 
 def in_other_order(
@@ -60,7 +60,7 @@ def in_other_order(
 
     Parameters
     ----------
-    short : number of segments behind the joint that have no length
+    short : number of segments after the joint that have no length
     """
     n, (mode, first) = len(itinerary), itinerary[i]
     for count in range(short, min(short, 1) - 1, -1):

@@ -78,7 +78,7 @@ class Columns:
         return array
 
     def take_behind(self, name: str, back: Columns) -> NDArray[Any]:
-        """Return one column behind the reversed one of another side, without their common first row."""
+        """Return one column after the reversed one of another side, without their common first row."""
         before = back.take(name)[:0:-1]
         array, shift = self.take(name), len(before)
         array.resize((self.count + shift, *array.shape[1:]), refcheck=False)
@@ -177,12 +177,12 @@ class Side:
         self.count += 1
 
     def rewind(self, row: int) -> None:
-        """Take away the points behind a row."""
+        """Take away the points after a row."""
         self.count -= self.last - row
         self.last = row
 
     def end_at(self, row: int, point: Point, end: End) -> None:
-        """End with a point behind a row."""
+        """End with a point after a row."""
         self.rewind(row)
         self.last += 1
         self.count += 1

@@ -18,7 +18,7 @@ from contfric.signature.holds import ends_rest, is_hold
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
 _TOGETHER = 1e-9
-#: Newton may fail right behind an event (a slide that vanishes, several conditions at once): it is reached
+#: Newton may fail right after an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
 #: Where two conditions fail together at an orbit that is symmetric in time (without damping), Newton fails

@@ -46,12 +46,12 @@ _COMPLEX = 1e-6
 def smooth_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
 ) -> list[Located]:
-    """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good behind them."""
+    """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good after them."""
     from contfric.continuation.bracket import BY_TEST
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base = len(before.tests) - EXTRA
-    # events behind a sliding one do not happen
+    # events after a sliding one do not happen
     after = _last_told(orbit, beyond, settings) or after
     values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
     found: list[Located] = []
@@ -116,12 +116,14 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
     end; rounding is as large between two points however near they are.
     """
     step = after.arc - before.arc
+    # next to an exit without a rate a multiplier has a pole, to which no point is told nearer than this
+    small = min(_NUDGE * step, 0.01 * SAME_PLACE)
     if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
         return False
     over_step = abs(float(after.tests[index] - before.tests[index]))
     return any(
-        _change_next_to(orbit, point, shift * step, index, settings) > _ERRATIC * over_step
-        for point, shift in ((before, _NUDGE), (after, -_NUDGE))
+        _change_next_to(orbit, point, shift, index, settings) > _ERRATIC * over_step
+        for point, shift in ((before, small), (after, -small))
     )
 
 

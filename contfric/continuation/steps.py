@@ -21,7 +21,7 @@ from contfric.orbit.spectrum import SpectralWorkspace, multipliers, spectral_wor
 from contfric.orbit.stationary import StationaryPoints, stationary_workspace
 from contfric.orbit.system import IntArray
 
-#: Extra columns of the tests behind the margins and the distances of the labels: slope of the
+#: Extra columns of the tests after the margins and the distances of the labels: slope of the
 #: parameter, products of 1 - mu and of
 #: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)

@@ -124,7 +124,7 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
 
 
 def chosen_at(system: System, test: Test) -> str:
-    """Return the surface of the reset that chooses the mode behind it by the side of a test; else nothing."""
+    """Return the surface of the reset that chooses the mode after it by the side of a test; else nothing."""
     joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
     exit_ = system.itinerary[joint % len(system.itinerary)][1]
     reset = system.model.reset_by_surface.get(exit_)
@@ -170,7 +170,7 @@ def thrown_at(orbit: Orbit, test: Test) -> str:
 
 
 def leads_elsewhere(orbit: Orbit, test: Test) -> bool:
-    """Tell whether nothing lies between the motions on both sides of an event.
+    """Tell whether nothing lies between the solutions on both sides of an event.
 
     So it is where a reset takes what touches it somewhere else, where a reset chooses another mode, and where
     a touch leads into a mode that overlaps.

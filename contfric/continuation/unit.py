@@ -31,7 +31,7 @@ class Form:
     joints : start joints (t, y) of the segments, shape (k, 1 + n)
     away : how fast the start joints move in time where the new orbit is singular at the event, shape (k,)
     reason : what happens at its places, in words
-    unit : of the motion
+    unit : of the solution
     """
 
     itinerary: Itinerary
@@ -42,7 +42,7 @@ class Form:
 
     @cached_property
     def orbit(self) -> Orbit:
-        """The motion as an orbit of this form alone; on its half where the unit is half of it.
+        """The solution as an orbit of this form alone; on its half where the unit is half of it.
 
         Raises
         ------
@@ -59,13 +59,13 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """The shortest part of a motion that it consists of.
+    """The shortest part of a solution that it consists of.
 
     Attributes
     ----------
     model : the model that moves
     vector : parameters
-    periods : shortest period of the motion, in periods of the excitation
+    periods : shortest period of the solution, in periods of the excitation
     half : whether the unit is half of it, the other half being its symmetry image
     duration : of the unit
     mode : mode of the slide that it begins with
@@ -103,7 +103,7 @@ class Unit:
         return mirror_pairs(self.model, itinerary) if self.half and times % 2 else itinerary
 
     def orbit(self, forms: tuple[Form, ...]) -> tuple[Orbit, FloatArray]:
-        """Return the motion as an orbit of forms one after the other, and how its joints move away.
+        """Return the solution as an orbit of forms one after the other, and how its joints move away.
 
         An odd number of half units is the half of a symmetric orbit.
 
@@ -129,7 +129,7 @@ class Unit:
 
 
 def unit_of(orbit: Orbit) -> Unit:
-    """Return the unit of the motion of a whole orbit."""
+    """Return the unit of the solution of a whole orbit."""
     slides = slides_of(orbit)
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
@@ -149,7 +149,7 @@ class Piece:
     ----------
     number : units of the orbit before it
     segments : of the orbit; those past its end are of its next period
-    itinerary : of the piece, as that of the first unit of the motion
+    itinerary : of the piece, as that of the first unit of the solution
     """
 
     number: int
@@ -168,7 +168,7 @@ def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
     cuts = _cuts(orbit, unit)
     if cuts is None:
         raise NotationError(
-            "the edited itinerary does not begin with a slide where the motion does"
+            "the edited itinerary does not begin with a slide where the solution does"
         )
     count, found = len(orbit.itinerary), []
     for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):

@@ -1,4 +1,4 @@
-"""Where a motion at rest could just not be left any more, and where a segment touches a surface.
+"""Where a solution at rest could just not be left any more, and where a segment touches a surface.
 
 Both are places on one known segment, looked for once an event.
 """
@@ -155,7 +155,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     start = orbit.begins[i]
     rises = orbit.flow.rate(orbit.itinerary[i][0], observable, float(start[0]), start[1:])
     gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
-    # behind a reset that has just touched, the motion is at its start again: no touch of its own
+    # after a reset that has just touched, the solution is at its start again: no touch of its own
     rests = surface not in model.reset_by_surface
     if rests and abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
         return np.array(start)  # it begins with the touch

@@ -3,7 +3,7 @@
 For a direction (tau, xi, delta) of (t_i, y_i, duration) they are the change of the exact first
 derivatives. A flow may give that of its own (:mod:`contfric.flow.second`); else they are central differences.
 
-*Behind a reset* a segment is ``phi(t_i, R(t_i, y_i), d)``, and its derivatives follow by the chain rule.
+*After a reset* a segment is ``phi(t_i, R(t_i, y_i), d)``, and its derivatives follow by the chain rule.
 Central differences of those contain the second derivatives of R.
 
 *Divided exit rows.* The exit row of a short segment that begins on its exit surface is the mean of the

@@ -14,7 +14,7 @@ from contfric.models.definition import FloatArray
 
 
 def birth_among(problem: Problem, chain: list[Point]) -> int | None:
-    """Return the first point of a chain behind which orbits have become their own images."""
+    """Return the first point of a chain after which orbits have become their own images."""
     if problem.kind is not Kind.SN or problem.system.half or len(chain) < 2:
         return None
     passed = passed_vertex(problem.system, np.array([p.joints for p in chain]))

@@ -4,7 +4,7 @@
 condition   what vanishes
 ==========  ==================================================================================
 JOINT       observable less level at the end of a segment (CS, SS, T)
-START       the same at its start, behind its reset (T; CS where another mode follows an impact)
+START       the same at its start, after its reset (T; CS where another mode follows an impact)
 EXIT        rate of the exit's observable at the end of a segment: a tangential exit (AS, GS)
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
@@ -13,7 +13,7 @@ QUANTITY    what is asked of a quantity (:mod:`contfric.curves.held_conditions`)
 ==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
-that of the state at a fixed time after the start. All gradients are exact; behind a reset they follow by the
+that of the state at a fixed time after the start. All gradients are exact; after a reset they follow by the
 chain rule.
 """
 

@@ -225,7 +225,7 @@ class Curve(Shown):
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether the motion is its own mirror image."""
+        """Whether the solution is its own mirror image."""
         part = self._longest
         if part.system.half:
             return True

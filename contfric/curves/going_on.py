@@ -1,9 +1,9 @@
-"""What a curve becomes behind another sliding event: the same condition in an edited itinerary.
+"""What a curve becomes after another sliding event: the same condition in an edited itinerary.
 
 At the event the motion is known, and every itinerary that can follow it solves the same equations there
 (:mod:`contfric.continuation.candidates`). The condition is found again in the new itinerary by its place: the
 same surface at the same time. SN, BP and PD go on if the new itinerary has the multiplier as well: where the
-motion is differentiable through the event.
+solution is differentiable through the event.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
 
 
 def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
-    """Tell whether margins of two itineraries for one motion vanish at one place, or its mirror image."""
+    """Tell whether margins of two itineraries for one solution vanish at one place, or its mirror image."""
     time, surface = place_of(one, a)
     there, on = place_of(other, b)
     period = one.period
@@ -133,7 +133,7 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
 
 
 def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
-    """Return the tangency of a motion in another itinerary for it; None where no segment of it touches."""
+    """Return the tangency of a solution in another itinerary for it; None where no segment of it touches."""
     try:
         place = _tangent_at(one, test)
     except ParameterError:
@@ -152,7 +152,7 @@ def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
 
 @remembered()
 def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float) -> Start | None:
-    """Return where a curve goes on behind a sliding event, in the direction that it has; None if nowhere.
+    """Return where a curve goes on after a sliding event, in the direction that it has; None if nowhere.
 
     What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
     symmetric one that it has met.

@@ -67,7 +67,7 @@ def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator
 
 
 def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
-    """Yield the curves of all margins that vanish at a point, in all itineraries for the motion there."""
+    """Yield the curves of all margins that vanish at a point, in all itineraries for the solution there."""
     seen: set[tuple[int, Test]] = set()  # systems are built once each
     for orbit in (special.orbit, *itineraries_at(special), *_itineraries_of_own(special, problem)):
         for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
@@ -96,7 +96,7 @@ def _itineraries_of_own(special: SpecialPoint, problem: Problem) -> Iterator[Orb
 
 
 def other_itineraries(part: CurvePart, largest: float) -> Iterator[Start]:
-    """Yield the starts of a CS curve in the other itineraries for its motion, from its middle.
+    """Yield the starts of a CS curve in the other itineraries for its solution, from its middle.
 
     The motion is the same, but its neighbours are others: they have their own folds and doublings there.
     """

@@ -25,7 +25,7 @@ _TOGETHER = 1e-8
 MARGINAL = 1e-6
 #: Arclength within which a tangency belongs to a sliding event: where a stop meets a surface labels change.
 _OF_EVENT = 1e-5
-#: Columns behind the margins and the distances of the labels (``contfric.curves.correct``).
+#: Columns after the margins and the distances of the labels (``contfric.curves.correct``).
 _BEND, _ONE, _MINUS, _PAIR = range(EXTRA)
 
 

@@ -176,7 +176,7 @@ class Held:
         return np.column_stack([shortest, basis[:, rows:]])
 
     def directions(self, columns: FloatArray) -> Directions:
-        """Return scaled directions, shape (N m + q, D), as motions of joints and parameters."""
+        """Return scaled directions, shape (N m + q, D), as solutions of joints and parameters."""
         plain, size = columns * self.weights[:, None], self.orbit.joints.size
         vector = np.zeros((len(self.orbit.vector), columns.shape[1]))
         vector[self.which] = plain[size:]

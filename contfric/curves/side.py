@@ -31,7 +31,7 @@ class CurveSide:
     end : why it ended
     tip : the last point, with its tangent
     border : the vectors b and c there
-    following : what it goes on as behind its end, where its signature changes
+    following : what it goes on as after its end, where its signature changes
     """
 
     problem: Problem

@@ -241,7 +241,7 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     problem, border = side.problem, side.border.copy()
     rows, first, stop, why, step = march_on(problem, side.points, border, step, largest, most)
     fresh = rows.points(first, stop)
-    lasting = stop - 1 if why == EVENT else stop  # the last point lies behind an event
+    lasting = stop - 1 if why == EVENT else stop  # the last point lies after an event
     gone = _first(~np.all(np.diff(rows.joints[first:lasting, :, 0]) > -_NO_TIME, axis=1))
     if gone is not None:
         side.points += fresh[:gone]

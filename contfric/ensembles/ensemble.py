@@ -310,7 +310,7 @@ class Ensemble(Shown):
         return frame_of(self, table)
 
     def to_xarray(self) -> xr.Dataset:
-        """Return samples, places of events and bands as a dataset (needs xarray)."""
+        """Return samples, locations of events and bands as a dataset (needs xarray)."""
         need_xarray()
         from contfric.ensembles.tables import dataset_of
 

@@ -79,7 +79,7 @@ def _classes(found: Ensemble) -> list[dict[str, Any]]:
 
 
 def dataset_of(found: Ensemble) -> xr.Dataset:
-    """Return an ensemble as a dataset: samples, places of events, bands."""
+    """Return an ensemble as a dataset: samples, locations of events, bands."""
     import xarray as xr
 
     bands, events = found.bands(), found.events

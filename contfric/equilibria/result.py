@@ -31,7 +31,7 @@ class Location(str, Enum):
 
     ADMISSIBLE = "admissible: inside of the region of its mode"
     BOUNDARY = "on the boundary of the region of its mode"
-    VIRTUAL = "virtual: outside of the region of its mode, so that no motion rests there"
+    VIRTUAL = "virtual: outside of the region of its mode, so that no solution rests there"
 
 
 @dataclass(frozen=True, eq=False)

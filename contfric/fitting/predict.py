@@ -1,7 +1,7 @@
 r"""What a model says to each measurement, with derivatives by every parameter.
 
 At a fixed time t a signal g moves by its change at a fixed share of the segment, less its rate times the
-motion of that share's time: :math:`\delta g|_t = \delta g|_s - \dot g\,\delta t|_s`.
+solution of that share's time: :math:`\delta g|_t = \delta g|_s - \dot g\,\delta t|_s`.
 """
 
 from __future__ import annotations

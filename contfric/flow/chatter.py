@@ -2,7 +2,7 @@ r"""Chatter: infinitely many impacts in finite time, and the contact that they l
 
 A mass that is pressed to a wall bounces lower and lower. Its impacts come ever faster and end at a time
 ``t*``, in a state ``y*`` that rests on the wall; there it stays until the force of the wall vanishes. All of
-that is one segment: its mode moves by the field of contact, and begins at the state behind an impact. From
+that is one segment: its mode moves by the field of contact, and begins at the state after an impact. From
 ``(t_0, y_0)`` the map of one flight and one impact is iterated, ``(t_n, y_n) -> (t_{n+1}, y_{n+1})``; then
 
     phi(t_0, y_0, d) = contact(t*, y*, d - (t* - t_0)),
@@ -60,7 +60,7 @@ FASTER = 2.0
 _REST = 1e-14
 #: A flight longer than this many periods (or units of time) is none between impacts of chatter; and where
 #: impacts have not come to rest in so many periods of an excitation, a mass is thrown about (10,000 of them,
-#: followed behind each of its impacts, took a second).
+#: followed after each of its impacts, took a second).
 _LONGEST = 64.0
 
 
@@ -103,7 +103,7 @@ def slope_at_node(speeds, nodes, count, i, k):  # type: ignore[no-untyped-def]
 
 @helper
 def flight_at(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
-    """Return (flight, side) of a state behind an impact, or in flight just behind one."""
+    """Return (flight, side) of a state after an impact, or in flight just after one."""
     side = motion.sides[mode]
     if (
         motion.others[mode] < 0
@@ -133,7 +133,7 @@ def is_left(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
-    """Advance (t, y) from behind an impact to behind the next; return the time between, -1 if there is none.
+    """Advance (t, y) from after an impact to after the next; return the time between, -1 if there is none.
 
     ``slopes`` (1 + n, 1 + n + k), the derivatives of (t, y), are advanced as well, if there are any.
     """
@@ -215,7 +215,7 @@ class Nodes(NamedTuple):
 
 @allocating_helper
 def keep_node(nodes, count, v, t, y, slopes, side, grad):  # type: ignore[no-untyped-def]
-    """Keep an impact (speed v, time t, state y behind it) as the next node; return their number."""
+    """Keep an impact (speed v, time t, state y after it) as the next node; return their number."""
     most, n, width = nodes.speeds.shape[0], y.shape[0], nodes.speeds_by.shape[1]
     if count == most:
         for i in range(most - 1):
@@ -251,7 +251,7 @@ def write_limit(nodes, count, limit, jac):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-untyped-def]
-    """Write the limit (t*, y*) of the impacts from behind one of them; return its error, -1 if there is none.
+    """Write the limit (t*, y*) of the impacts from after one of them; return its error, -1 if there is none.
 
     ``jac`` (1 + n, 1 + n + k), if it has space: its derivatives by t0, y0 and the parameters.
     """

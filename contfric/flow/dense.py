@@ -1,4 +1,4 @@
-"""An observable along a step: nodes of the motion itself, as dense as they are needed.
+"""An observable along a step: nodes of the solution itself, as dense as they are needed.
 
 The observable goes with the state as one more component, so that the steps resolve it. At a node q, q'
 and q'' are known (the second derivative from the gradient of the rate). The nodes at the ends of a step
@@ -53,7 +53,7 @@ def probed(motion, mode, c, target, t, at, p, workspace):  # type: ignore[no-unt
 
 @helper
 def is_flat(left, right, h):  # type: ignore[no-untyped-def]
-    """Tell whether an observable keeps its value along a step: a motion on the surface itself."""
+    """Tell whether an observable keeps its value along a step: a solution on the surface itself."""
     size = SHORTEST * SHORTEST * (1.0 + abs(left[0]))
     return (
         abs(right[0] - left[0]) <= size

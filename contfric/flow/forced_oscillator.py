@@ -208,7 +208,7 @@ def rate(mode, c, t, y, p, which, grad):  # type: ignore[no-untyped-def]
 
 @helper
 def is_motion(t0, y0, dt, p):  # type: ignore[no-untyped-def]
-    """Tell whether there is a motion to search: iterates of Newton's method may be anything."""
+    """Tell whether there is a solution to search: iterates of Newton's method may be anything."""
     return p[OMEGA] > 0.0 and math.isfinite(t0 + dt + y0[0] + y0[1] + p[S] + p[H] + p[ZETA])
 
 

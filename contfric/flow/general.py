@@ -3,7 +3,7 @@
 A mode moves by its closed form where it is affine (:mod:`contfric.flow.linear`), else by integration
 (:mod:`contfric.flow.kinked`). A mode that slides starts on its surfaces: what is moved is the state put
 onto them, so that derivatives are multiplied by those of that projection. The zeros of what depends on
-time alone are sought along a motion at rest: they need no integration.
+time alone are sought along a solution at rest: they need no integration.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def either(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-unty
 
 @allocating_helper
 def either_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]
-    """Find the first hit along a motion of either kind."""
+    """Find the first hit along a solution of either kind."""
     if in_closed_form(motion, mode) and motion.seen[c] != 0:
         return linear_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1)
     return stepped_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1)
@@ -82,7 +82,7 @@ def either_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
 
 @allocating_helper
 def either_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[no-untyped-def]
-    """Find the stationary points along a motion of either kind."""
+    """Find the stationary points along a solution of either kind."""
     if in_closed_form(motion, mode) and motion.seen[c] != 0:
         return linear_stationary(motion, mode, c, t0, y0, dt, p, times, values)
     return stepped_stationary(motion, mode, c, t0, y0, dt, p, times, values)
@@ -125,7 +125,7 @@ def stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: ignore[n
 
 @kernel(field_signature, counts=False)
 def still(mode, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
-    """Return no motion: the field of a clock."""
+    """Return no solution: the field of a clock."""
     for i in range(out.shape[0]):
         out[i] = 0.0
     for i in range(jac.shape[0]):
@@ -134,7 +134,7 @@ def still(mode, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
 
 
 class Kind(str, Enum):
-    """Which methods a model's motions are found by: each kind has kernels of its own."""
+    """Which methods a model's solutions are found by: each kind has kernels of its own."""
 
     PLAIN = "plain"  # steps of the explicit method, and the closed form
     STIFF = "stiff"  # steps of either method, chosen on the way or always implicit

@@ -1,7 +1,7 @@
 """The first hit along an integrated segment.
 
-Roots are isolated between nodes of the motion (:mod:`contfric.flow.dense`) and refined by Newton's
-method with probes until rounding. A motion that starts on the level leaves it with the first power of
+Roots are isolated between nodes of the solution (:mod:`contfric.flow.dense`) and refined by Newton's
+method with probes until rounding. A solution that starts on the level leaves it with the first power of
 time whose coefficient is not rounding.
 """
 
@@ -105,7 +105,7 @@ def signed_coefficients(sign, left, right, length):  # type: ignore[no-untyped-d
 
 @helper
 def leaving(left, on):  # type: ignore[no-untyped-def]
-    """Return the side that the motion starts to, and the order of the root that it starts on.
+    """Return the side that the solution starts to, and the order of the root that it starts on.
 
     Side 0: two rates vanish as well.
     """

@@ -45,7 +45,7 @@ from contfric.handle import Block, Bound
 
 
 class Method(str, Enum):
-    """How a motion is integrated."""
+    """How a solution is integrated."""
 
     EXPLICIT = "explicit"
     IMPLICIT = "implicit"
@@ -77,14 +77,14 @@ class AffineModes:
 
 @dataclass(frozen=True)
 class Functions:
-    """What motions are found from.
+    """What solutions are found from.
 
     Attributes
     ----------
     field, observe, rate, period, scale : the functions that the module describes
     modes, observables : how many there are
     method : ``explicit`` (order 8), or ``automatic`` where a mode is stiff: it changes to the implicit
-        method and back as the motion asks for it
+        method and back as the solution asks for it
     relative, absolute : error that a step may make relative to a state, and to its scale
     sides : for (mode, observable): the side, 1 or -1, of a level of the observable that segments of the
         mode which start on it leave to; one that leaves to the other side hits at once
@@ -130,7 +130,7 @@ class Functions:
 
     @property
     def kind(self) -> Kind:
-        """Which kernels the motions are found by."""
+        """Which kernels the solutions are found by."""
         return Kind.PLAIN if Method(self.method) is Method.EXPLICIT else Kind.STIFF
 
     def flow(self, level: Kernel | Bound, **others: Any) -> CompiledFlow:

@@ -25,7 +25,7 @@ class CompiledFlow:
     hit : first time at which an observable takes a level
     period : period of the excitation (0 for an autonomous model), with its gradient
     rate : rate of an observable along a mode, with its gradient
-    reset : state behind the reset at a surface, with its derivatives; None if the model has no resets
+    reset : state after the reset at a surface, with its derivatives; None if the model has no resets
     second : second derivatives in a direction, for curves in two parameters; without it they are
         differences of the first ones
     together : first hits of many motions at once, with derivatives; without it each is asked for by itself
@@ -59,7 +59,7 @@ class CompiledFlow:
         return self._blocks[2].address  # type: ignore[no-any-return]
 
     def hits_together(self) -> int:
-        """Return the first hits of many motions as kernels take them."""
+        """Return the first hits of many solutions as kernels take them."""
         return self._together.address  # type: ignore[no-any-return]
 
     @cached_property
@@ -72,7 +72,7 @@ class CompiledFlow:
 
     @cached_property
     def _blocks(self) -> tuple[Any, Any, Any]:
-        """The memory behind the handles: all functions, those without ``stationary``, second derivatives."""
+        """The memory after the handles: all functions, those without ``stationary``, second derivatives."""
         from contfric.flow.layouts import FLOW, SECOND
         from contfric.flow.resets import no_reset
         from contfric.flow.without import no_second, no_stationary

@@ -1,7 +1,7 @@
 """Motion through kinks: one mode of the engine, integrated piece by piece.
 
 At a *kink* the field is continuous and its derivatives are not: ``|v|`` at v = 0. With f- and f+ the
-fields before and behind a surface with normal n, the derivatives of the flow are multiplied there by the
+fields before and after a surface with normal n, the derivatives of the flow are multiplied there by the
 saltation matrix (Leine, Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", 2004,
 section 7.1)
 
@@ -14,7 +14,7 @@ step is taken again up to it, and the integration goes on in the next piece. An 
 a crossing changes the state by the second order of d, since the slopes are the same.
 
 Where v touches 0 from one side it does not cross, and nothing happens. The number of crossings changes
-there by two; the state at the end of the motion is continuously differentiable by its start, with a
+there by two; the state at the end of the solution is continuously differentiable by its start, with a
 derivative that changes like the square root of the distance from the touch, on the side that crosses.
 
 For K kinks the fields of the pieces are numbered ``mode * 2**K + bits``; bit k is set where the observable

@@ -1,4 +1,4 @@
-"""What compiled code finds behind a handle: the functions of a flow, and those of a model.
+"""What compiled code finds after a handle: the functions of a flow, and those of a model.
 
 The signatures of the functions stand in :mod:`contfric.compiled`.
 """
@@ -44,7 +44,7 @@ FlowType = HandleType("flow", FLOW)
 SECOND = {"second": second_signature}
 SecondType = HandleType("second", SECOND)
 
-#: The first hits of many motions at once.
+#: The first hits of many solutions at once.
 TOGETHER = {"together": together_signature}
 TogetherType = HandleType("together", TOGETHER)
 

@@ -190,7 +190,7 @@ def third_bound(mode, c, order, p, size, fast, window):  # type: ignore[no-untyp
 def natural_scale(mode, p):  # type: ignore[no-untyped-def]
     """Return the longest window worth a bound: one radian of the fastest motion.
 
-    Of a strongly damped slide: of the motion that is left when the fast exponential has gone.
+    Of a strongly damped slide: of the solution that is left when the fast exponential has gone.
     """
     fastest = p[OMEGA] if p[H] == 0.0 else 3.0 * p[OMEGA]
     if mode == STICK:

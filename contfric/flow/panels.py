@@ -14,7 +14,7 @@ units of e, see :mod:`contfric.flow.pieces` for the formula)::
 
 where the forms with s and s^2 serve a panel that starts on a zero. As a polynomial lies between its
 smallest and largest coefficient, panels *without* a zero and panels with *one* are recognised; of all
-others the halves are looked at, first of the polynomial, then of the motion itself.
+others the halves are looked at, first of the polynomial, then of the solution itself.
 """
 
 from __future__ import annotations

@@ -142,7 +142,7 @@ def free(zeta, d):  # type: ignore[no-untyped-def]
     a, b = roots(zeta)
     g = difference(a, b, d)[0].real
     r = transfer(a, b, 0.0, d)[0].real
-    if zeta > 1.0:  # behind the fast exponential the slope is small of second order
+    if zeta > 1.0:  # after the fast exponential the slope is small of second order
         return g, a.real * g + math.exp(b.real * d), r
     return g, 1.0 - r - 2.0 * zeta * g, r
 

@@ -41,7 +41,7 @@ def time_to_cosine(cosine, start, w):  # type: ignore[no-untyped-def]
 def rest_stationary(x, w, phase, first, last, times, values):  # type: ignore[no-untyped-def]
     """Write the stationary points of the load between two times; return their number.
 
-    It is -1 if they are too many, or what is given is no motion at rest under an excitation.
+    It is -1 if they are too many, or what is given is no solution at rest under an excitation.
     """
     start = math.atan2(phase[0], phase[1])
     if not (w > 0.0 and math.isfinite(start + last)):

@@ -33,7 +33,7 @@ MOST_PIECES = 1_000_000
 
 @helper
 def leaving_side(q1, q2):  # type: ignore[no-untyped-def]
-    """Return the sign that a function takes behind a root."""
+    """Return the sign that a function takes after a root."""
     return 1.0 if (q1 > 0.0 or (q1 == 0.0 and q2 > 0.0)) else -1.0
 
 
@@ -66,7 +66,7 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
     what = mode, c, order, p, target, phase, t0, y0[0], y0[1]
     single, natural, (first, last) = order == 0, natural_scale(mode, p), interior_of(end)
     longest = PIECE * natural if single else end / math.ceil(end / (PIECE * natural))
-    stop = end if single else last  # a root of a rate behind the last place is at the joint
+    stop = end if single else last  # a root of a rate after the last place is at the joint
     tau, count, here = 0.0, 0, state_at(what, 0.0)
     length = min(longest, PIECE * scale_there(mode, p, natural, here[5]))
     leaving = on if single else abs(here[0]) <= AT_START * (1.0 + here[3])
@@ -88,7 +88,7 @@ def roots_along(mode, c, order, target, on, sign, phase, t0, y0, end, p, times, 
                 count = add_root(root, seen, first, last, count, times, values)
                 if count < 0:
                     return -1, root, math.nan
-                sign = -sign  # and behind the root, up to the end of the part, it falls further
+                sign = -sign  # and after the root, up to the end of the part, it falls further
             if outcome != UNSURE:
                 tau, leaving, length, here = after, False, min(longest, 2.0 * length), there
                 continue

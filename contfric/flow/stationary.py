@@ -1,6 +1,6 @@
 """The stationary points of an observable along an integrated segment: all of them.
 
-Zeros of the rate are isolated between nodes of the motion (:mod:`contfric.flow.dense`) and refined by
+Zeros of the rate are isolated between nodes of the solution (:mod:`contfric.flow.dense`) and refined by
 probes.
 """
 

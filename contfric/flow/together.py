@@ -1,8 +1,8 @@
-"""First hits of many motions of the oscillator at once: slides side by side, and what ends a rest.
+"""First hits of many solutions of the oscillator at once: slides side by side, and what ends a rest.
 
 Without damping and third harmonic, as the planes of Lyapunov exponents have them. Values differ from those
 of :func:`contfric.flow.forced_oscillator.hit` in the last digits, as the sines do
-(:mod:`contfric.flow.sines`); for one motion they are the same as for many.
+(:mod:`contfric.flow.sines`); for one solution they are the same as for many.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def write_slides(who, count, work, tau, surfaces, ends, jac):  # type: ignore[no
 
 @kernel(together_signature)
 def together(count, modes, on, times, states, p, longest, tau, surfaces, ends, jac):  # type: ignore[no-untyped-def]
-    """Find the first hits of many motions; the signature stands in :mod:`contfric.compiled`."""
+    """Find the first hits of many solutions; the signature stands in :mod:`contfric.compiled`."""
     work, who, filled = np.zeros((ROWS, LANES)), np.empty(LANES, dtype=np.int64), 0
     for k in range(count):
         surfaces[k] = SINGLY

@@ -28,6 +28,6 @@ SINGLY = -2
 
 @kernel(together_signature, counts=False)
 def no_together(count, modes, on, times, states, p, longest, tau, surfaces, ends, jac):  # type: ignore[no-untyped-def]
-    """Say that each motion is to be asked for by itself."""
+    """Say that each solution is to be asked for by itself."""
     for k in range(count):
         surfaces[k] = SINGLY

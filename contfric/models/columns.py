@@ -39,14 +39,14 @@ class Column:
         return self._array[k if k >= 0 else self._count + k].item()
 
     def append(self, value: float) -> None:
-        """Put a number behind the others."""
+        """Put a number after the others."""
         if self._count == len(self._array):
             self._array = np.concatenate([self._array, np.zeros_like(self._array)])
         self._array[self._count] = value
         self._count += 1
 
     def extend(self, values: Iterable[float]) -> None:
-        """Put numbers behind the others."""
+        """Put numbers after the others."""
         for value in values:
             self.append(value)
 
@@ -56,5 +56,5 @@ class Column:
 
     @property
     def array(self) -> np.ndarray:
-        """The numbers as an array; there are zeros behind them."""
+        """The numbers as an array; there are zeros after them."""
         return self._array

@@ -128,7 +128,7 @@ class Composition:
         return self.structure.loads.couples(contact)
 
     def limit(self, surface: str) -> Limit | None:
-        """Return the limit of a shared load that a surface is; None if it is none."""
+        """Return the limit of a shared load that a surface is; None if it is not one."""
         if surface not in self._limits:
             self._limits[surface] = self.structure.loads.limit(surface)
         return self._limits[surface]

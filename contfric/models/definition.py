@@ -10,9 +10,9 @@ simulation, the boundary-value problem, admissibility and the drawings.
 * A **reset** maps the state where it meets a surface: an impact.
 
 Transitions are derived from the signs of the domains (:attr:`Model.transitions`): crossing a
-transparent surface flips its sign; at a switching surface the motion stays on the surface if a
+transparent surface flips its sign; at a switching surface the solution stays on the surface if a
 domain exists there (a stick), leaves it as the model's departures say if one of them does, and
-otherwise goes through to the other side. Behind a reset the signs of the mapped state decide, so that
+otherwise goes through to the other side. After a reset the signs of the mapped state decide, so that
 several domains can follow (:attr:`Model.targets`).
 
 Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
@@ -191,7 +191,7 @@ class Model(Shown, TransitionMaps):
 
     @property
     def closed_form(self) -> tuple[str, ...]:
-        """Modes whose motion is a closed form, of a model that is declared by its equations."""
+        """Modes whose solution is a closed form, of a model that is declared by its equations."""
         if not self.definition:
             return ()
         names = (mode.name for mode in self.modes if mode.name not in self.integrated)

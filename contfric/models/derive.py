@@ -359,6 +359,6 @@ def _image(
             if all(abs(a - sense * b) <= _SAME * (1.0 + abs(a) + abs(b)) for a, b in pairs):
                 return other, sense
     raise ModelError(
-        f"the image of surface '{surface.name}' ({surface.observable} = {surface.level}) is none of "
+        f"the image of surface '{surface.name}' ({surface.observable} = {surface.level}) is not one of "
         "the surfaces: there is no such symmetry, or a surface is missing"
     )

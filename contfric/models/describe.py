@@ -290,7 +290,7 @@ def _resets(
     surfaces: tuple[Surface, ...],
     modes: tuple[ModeText, ...],
 ) -> dict[str, Any]:
-    """Return the maps of the states, the modes behind them that are named, and those that they act in."""
+    """Return the maps of the states, the modes after them that are named, and those that they act in."""
     part = top.part("resets", "a mapping of surfaces to {state: new value, to: mode, from: modes}")
     part.only([s.name for s in surfaces])
     maps, leads, acts = {}, {}, {}

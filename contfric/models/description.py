@@ -54,7 +54,7 @@ class Description:
     define : (name, expression) of each named part
     modes, domains, departures : as declared; what can be derived is derived from them
     resets : surface -> state -> expression
-    leads : surface -> modes behind the reset, the first that holds, where they are said
+    leads : surface -> modes after the reset, the first that holds, where they are said
     acts : surface -> modes in which the reset acts, where they are said
     chatters : modes that begin with infinitely many impacts
     symmetry : name (a state or t) -> expression of its image; None if there is none

@@ -134,5 +134,5 @@ class Part:
 
 
 def is_number(value: object) -> bool:
-    """Tell whether an entry is a number; true and false are none."""
+    """Tell whether an entry is a number; true and false are not."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -29,7 +29,7 @@ _LARGEST = sys.float_info.max
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
-    """The sign of x: 1, 0 or -1. Its derivative is 0: that of the motion on either side."""
+    """The sign of x: 1, 0 or -1. Its derivative is 0: that of the solution on either side."""
 
     nargs = 1
 

@@ -108,7 +108,7 @@ class Landing:
         if len(told) == 1 and (self.leads or not verdicts[0]):
             return (
                 told.pop()
-            )  # the mode that is asked for may not hold at states that no motion brings
+            )  # the mode that is asked for may not hold at states that no solution brings
         one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
         if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
@@ -117,13 +117,13 @@ class Landing:
         if any(self.surface in wraps_of(a) for a in self.sampler.evaluator.description.angles):
             raise EntryError(
                 ("angles",),
-                f"a turn ends at '{self.surface}', and no mode holds behind it, so that nothing turns round: "
+                f"a turn ends at '{self.surface}', and no mode holds after it, so that nothing turns round: "
                 "leave 'angles' out, or write the surface that is in the way as sin((theta - wall)/2) = 0",
             )
         raise EntryError(
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
-            "side of it, some to the other, or to none: behind a reset the rates must tell the side",
+            "side of it, some to the other, or to none: after a reset the rates must tell the side",
         )
 
     def _behind(

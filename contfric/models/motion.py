@@ -62,7 +62,7 @@ AFFINE = AffineModes(
 
 _FLOW = '''
 def functions(tolerance):
-    """Return what motions are found from."""
+    """Return what solutions are found from."""
     return Functions(
         field={field},
         observe=observe,

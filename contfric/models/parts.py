@@ -104,7 +104,7 @@ class Lead:
 
 
 def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Domain]:
-    """Return the domains behind a reset: of modes that overlap there the first that it leads into.
+    """Return the domains after a reset: of modes that overlap there the first that it leads into.
 
     A mode that it names is preferred to sliding on a surface next to it. Where it leads into none of them,
     the mode before it goes on.
@@ -145,7 +145,7 @@ class Departure:
 class Reset:
     """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact, a switch, a firing.
 
-    The flow has the map (:data:`contfric.compiled.reset_signature`). The state behind it is on the surface
+    The flow has the map (:data:`contfric.compiled.reset_signature`). The state after it is on the surface
     still (an impact on a wall, or through the surface), on another one, or on none.
 
     Attributes
@@ -156,10 +156,10 @@ class Reset:
         the signs of these
     lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
         surface that is +1 where it goes back (a wall), -1 where it passes
-    leads : the modes behind the reset, the first that holds; else the mode before it where that holds, or
+    leads : the modes after the reset, the first that holds; else the mode before it where that holds, or
         another one
     modes : modes in which it acts; by default (empty) those that lie on one side of the surface
-    wraps : whether it takes an angle back by a turn, which is nothing to the motion: it bounds nothing
+    wraps : whether it takes an angle back by a turn, which is nothing to the solution: it bounds nothing
     """
 
     surface: str
@@ -183,7 +183,7 @@ class Reset:
 
 @dataclass(frozen=True)
 class Chatter:
-    """Infinitely many impacts in finite time, and the contact behind them, as one mode of its own.
+    """Infinitely many impacts in finite time, and the contact after them, as one mode of its own.
 
     Attributes
     ----------

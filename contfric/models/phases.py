@@ -29,7 +29,7 @@ KEY = "phase"
 _SAME = 1e-9
 #: States at which two expressions must agree to be the same.
 _POINTS = 8
-#: Where in a period: at no time at which motions start, forces are largest, or simulations end.
+#: Where in a period: at no time at which solutions start, forces are largest, or simulations end.
 _LATE = 1
 #: The phase doubles the regions of a model: one with more modes, of many contacts, has thousands already, and
 #: a section of its own where no contact acts.

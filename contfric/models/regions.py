@@ -71,7 +71,7 @@ def combinations(surfaces: list[Surface], fixed: Mapping[str, int]) -> list[Side
 
 
 def is_possible(surfaces: list[Surface], sides: Mapping[str, int]) -> bool:
-    """Tell whether a motion can be on all of some sides at once."""
+    """Tell whether a solution can be on all of some sides at once."""
     for _, group in itertools.groupby(surfaces, key=lambda s: s.observable):
         names = [s.name for s in group]
         if {name: sides[name] for name in names} not in _heights(names):

@@ -109,7 +109,7 @@ class SharedLoads:
         return tuple((c, states[c.name]) for c in self._structure.contacts if c.name in near)
 
     def limit(self, name: str) -> Limit | None:
-        """Return the limit that a surface is, of contacts that act on each other; None if it is none."""
+        """Return the limit that a surface is, of contacts that act on each other; None if it is not one."""
         found = _LIMIT.fullmatch(name)
         contact = self._by_name.get(found[1]) if found else None
         if found is None or contact is None or not self.couples(contact):

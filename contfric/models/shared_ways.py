@@ -3,7 +3,7 @@
 The contacts that are at rest then, and feel each other over others that are, decide together
 (:mod:`contfric.models.complementarity`): the one whose state changes, and those of its cluster
 (:mod:`contfric.models.shared_loads`). Each combination of their states is possible under conditions on loads
-in the setting behind the event: of what sticks within the limits, of what slides beyond. Where one solution
+in the setting after the event: of what sticks within the limits, of what slides beyond. Where one solution
 exists exactly one of them holds.
 
 A simulation solves for the states at the joint. Of the combinations only those that are near are listed: in

@@ -45,7 +45,7 @@ from contfric.handle import Block, HandleType
 from contfric.models.native import Function, translated
 
 _log = logging.getLogger("contfric.compiled")
-#: What is loaded stays: a second copy of the same names would lie beside it.
+#: What is loaded stays: a second copy of the same names would lie next to it.
 _LOADED: dict[str, Any] = {}
 
 

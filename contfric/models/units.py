@@ -4,7 +4,7 @@ Formulas are written in the units of the file, SI for instance. Newton's method,
 distances between orbits weigh all unknowns alike, and rounding is compared with 1: they want numbers of
 order 1. So a state of unit U is ``x = U X``, time is ``t = U_t T``, and
 
-    dX/dT = (U_t/U) dx/dt ,    period/U_t ,    X behind a reset = (new value)/U .
+    dX/dT = (U_t/U) dx/dt ,    period/U_t ,    X after a reset = (new value)/U .
 
 What is solved, and all that results say of states and times, is in these units; parameters and quantities
 that the file declares stay as they are. Observables are divided by a power of ten near their size.

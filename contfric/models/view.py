@@ -159,7 +159,7 @@ class FlowView:
         )
 
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
-        """Return the state behind the reset at a surface, shape (n,)."""
+        """Return the state after the reset at a surface, shape (n,)."""
         k, out = self.model.surface_index[surface], np.empty(len(y))
         y = np.ascontiguousarray(y)
         self.model.flow.reset(k, t, y, self.vector, _NONE, out, _NOTHING)

@@ -1,4 +1,4 @@
-"""The state behind a reset in which a segment begins, and derivatives by the chain rule, compiled."""
+"""The state after a reset in which a segment begins, and derivatives by the chain rule, compiled."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contfric.compiled import helper
 
 @helper
 def apply_reset(functions, layout, i, start, p, which, workspace):  # type: ignore[no-untyped-def]
-    """Write the state in which segment i begins, behind its reset, with the derivatives if any are wanted.
+    """Write the state in which segment i begins, after its reset, with the derivatives if any are wanted.
 
     Only for a segment that has one: elsewhere its joint is where it begins.
     """
@@ -17,7 +17,7 @@ def apply_reset(functions, layout, i, start, p, which, workspace):  # type: igno
 
 @helper
 def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
-    """Make the derivatives of a flow behind a reset those with respect to the joint before it."""
+    """Make the derivatives of a flow after a reset those with respect to the joint before it."""
     for j in range(n):
         for k in range(n):
             row[k] = jac[j, 1 + k]

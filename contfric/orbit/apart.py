@@ -1,4 +1,4 @@
-"""How far two motions are apart, compiled: asked for every pair of events."""
+"""How far two solutions are apart, compiled: asked for every pair of events."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contfric.compiled import f8, helper, kernel, matrix, vector
 
 @helper
 def joint_gap(one, i, other, j, cycles):  # type: ignore[no-untyped-def]
-    """Return how far a joint of one motion is from one of another, in the largest component."""
+    """Return how far a joint of one solution is from one of another, in the largest component."""
     gap = 0.0
     for k in range(one.shape[1]):
         apart, cycle = abs(one[i, k] - other[j, k]), cycles[k]

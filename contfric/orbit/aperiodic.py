@@ -33,7 +33,7 @@ _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
 
 
 def affordable(model: Model, done: int, events: int) -> int:
-    """Return how many periods a motion may be followed that has met some events in those that are done."""
+    """Return how many periods a solution may be followed that has met some events in those that are done."""
     work = events * len(model.states) ** 2
     return MOST if not work else min(MOST, max(_LEAST, int(done * _WORK / work)))
 
@@ -41,13 +41,13 @@ def affordable(model: Model, done: int, events: int) -> int:
 def why_none(
     trajectory: Trajectory, done: int, slow: tuple[int, int, float] | None, compared: bool
 ) -> ConvergenceError | AperiodicError:
-    """Return the error that says why a motion has come to no orbit.
+    """Return the error that says why a solution has come to no orbit.
 
     Parameters
     ----------
     done : periods that were simulated
     slow : a return (events, periods, mismatch) that is nearly exact
-    compared : whether it is worth 200 periods more to tell whether the motion is chaotic
+    compared : whether it is worth 200 periods more to tell whether the solution is chaotic
     """
     if slow is not None:
         return ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
@@ -60,7 +60,7 @@ def why_none(
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
-        f"the motion at {where} has not converged in {done} periods: it still changes by "
+        f"the solution at {where} has not converged in {done} periods: it still changes by "
         f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
         "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
         "little, or add damping"
@@ -80,26 +80,26 @@ def _unbounded(trajectory: Trajectory) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     size = float(np.max(np.abs(trajectory.states[-1])))
     return (
-        f"no periodic orbit: the motion at {where} grows without bound (to {size:.3g} so far), as at "
+        f"no periodic orbit: the solution at {where} grows without bound (to {size:.3g} so far), as at "
         "a resonance with too little damping. Choose other parameters"
     )
 
 
-#: Times after which a motion that goes round is somewhere else: no multiples of each other's periods.
+#: Times after which a solution that goes round is somewhere else: no multiples of each other's periods.
 _LATER = 1.2345
 
 
 def _advice(trajectory: Trajectory, done: int) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
-        f"the motion at {where} is aperiodic: no period from 1 to {MOST_PERIODS} was found in {done} "
+        f"the solution at {where} is aperiodic: no period from 1 to {MOST_PERIODS} was found in {done} "
         f"periods. Try another parameter value, another start (state=...), a longer simulation "
         "(longest=...), or start from a signature (start: {signature: NAME} in a study)"
     )
 
 
 def _parting(trajectory: Trajectory) -> str:
-    """Return what two motions say that begin close to each other where a trajectory ends."""
+    """Return what two solutions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
     moved = np.array([not is_clock(name) for name in model.states])
     shift = moved * _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
@@ -119,11 +119,11 @@ def _parting(trajectory: Trajectory) -> str:
             f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it is "
             "chaotic, or a long transient of chaos"
         )
-    return ". Motions that begin close stay close: it is quasi-periodic, or it converges slowly"
+    return ". Solutions that begin close stay close: it is quasi-periodic, or it converges slowly"
 
 
 def goes_on(trajectory: Trajectory) -> str:
-    """Return what a motion does that meets nothing any more; nothing if it has come to an equilibrium."""
+    """Return what a solution does that meets nothing any more; nothing if it has come to an equilibrium."""
     model, (_, time, state, mode) = trajectory.model, trajectory.last
     vector = model.vector(trajectory.params)
     flow, whole, signs = (
@@ -135,7 +135,7 @@ def goes_on(trajectory: Trajectory) -> str:
         sides = {d.signs[surface] for d in model.domains_of(whole)}
         if side and sides == {-side}:
             return (
-                f"the motion has left the region of '{mode}' at '{surface}', where no mode follows. "
+                f"the solution has left the region of '{mode}' at '{surface}', where no mode follows. "
                 "`contfric check` says what is missing"
             )
     before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))

@@ -1,4 +1,4 @@
-"""How the segments of an itinerary begin: behind a reset, on their own exit surface, or as any."""
+"""How the segments of an itinerary begin: after a reset, on their own exit surface, or as any."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
 def entry_rows(
     model: Model, itinerary: Itinerary, entered: list[str], domains: tuple[str, ...]
 ) -> list[tuple[int, ...]]:
-    """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode behind it."""
+    """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode after it."""
     rows: list[tuple[int, ...]] = []
     for i, surface in enumerate(entered):
         reset = model.reset_by_surface.get(surface)

@@ -79,7 +79,7 @@ class EquationWorkspace(NamedTuple):
     ----------
     state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
     between : a state within a segment, shape (n,)
-    behind : state behind a reset, in the last row, and the derivatives of the reset, shape
+    behind : state after a reset, in the last row, and the derivatives of the reset, shape
         (n + 1, 1 + n + q)
     grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
     rates : rate of the exit's observable at the end of each segment, shape (N,)
@@ -154,7 +154,7 @@ def close_chain(functions, layout, z, p, which, workspace):  # type: ignore[no-u
 
 @helper
 def segment_jacobian(functions, layout, i, start, duration, p, which, out, workspace):  # type: ignore[no-untyped-def]
-    """Write the end of segment i, from its joint, with the derivatives: behind a reset by the chain rule."""
+    """Write the end of segment i, from its joint, with the derivatives: after a reset by the chain rule."""
     mode, state = layout.modes[i], workspace.state
     if layout.resets[i] >= 0:
         n = state.shape[0]

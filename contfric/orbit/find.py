@@ -34,7 +34,7 @@ _EXACT = 1e-9
 #: A motion whose returns shrink by less than this from one to the next takes hundreds of periods more. Its
 #: series, and the place of its end, are those of the orbit to this share: it is still some way off.
 _SLOW, _SERIES = 0.9, 0.2
-#: A motion that returns this near and still does not converge creeps along a continuum of orbits.
+#: A solution that returns this near and still does not converge creeps along a continuum of orbits.
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
 _FIRST, _LONGER = 200, 4
@@ -45,7 +45,7 @@ _MOST_EVENTS_AT_ONCE = 10_000_000
 _TURNS = 100_000
 #: Share of the time of the first half of these that the second half takes if they do not come faster.
 _STEADY = 0.5
-#: An orbit that a motion converges to attracts; beyond rounding its multipliers cannot exceed 1.
+#: An orbit that a solution converges to attracts; beyond rounding its multipliers cannot exceed 1.
 _ATTRACTS = 1.0 + 1e-6
 
 
@@ -59,7 +59,7 @@ def find_orbit(
     longest: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
-    """Simulate until the motion repeats itself, read off its signature and solve for it.
+    """Simulate until the solution repeats itself, read off its signature and solve for it.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def _settled(
     *,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
-    """Return the orbit that a motion converges to."""
+    """Return the orbit that a solution converges to."""
     span, done, events = _FIRST, 0, 0
     most = MOST if longest is None else longest
 
@@ -115,7 +115,7 @@ def _settled(
     unit = time_scale(model)
 
     def simulated(events: int) -> Trajectory:
-        """Follow the motion from its start, to a time and not to an event where that is gone on with."""
+        """Follow the solution from its start, to a time and not to an event where that is gone on with."""
         asked = span * unit
         return simulate(
             model, params, state=state, time=time, periods=asked, events=events, progress=heard
@@ -176,7 +176,7 @@ def _is_steady(trajectory: Trajectory) -> bool:
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
     if periods is not None and orbit.periods != periods:
         raise ConvergenceError(
-            f"the motion converges to an orbit of {orbit.periods} period(s), not {periods}: "
+            f"the solution converges to an orbit of {orbit.periods} period(s), not {periods}: "
             f"ask for periods={orbit.periods}, or start elsewhere (state=...)",
             orbit,
         )
@@ -189,7 +189,7 @@ def _check_motion(trajectory: Trajectory) -> None:
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
-            why = f"the motion stays in mode '{mode}' for ever: nothing releases it"
+            why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
         raise ConvergenceError(
             f"no periodic orbit: {why}. Choose other parameters or another start",
             trajectory,
@@ -201,7 +201,7 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
 
     A return that is not yet exact may belong to an orbit that repels, near an attractor of longer
     period; longer simulation tells. Only at the final look are multipliers asked instead, and where the
-    motion creeps towards the orbit as slowly as they say.
+    solution creeps towards the orbit as slowly as they say.
     """
     for lag, turns, mismatch in recurrences(trajectory):
         if creeps(trajectory, lag):  # near an orbit of another itinerary
@@ -223,11 +223,11 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
 
 
 def _crept_to(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
-    """Return the orbit that a motion approaches by a geometric series of small steps; None if it does not.
+    """Return the orbit that a solution approaches by a geometric series of small steps; None if it does not.
 
     Under strong damping a displacement decays within ``2 zeta``, thousands of periods. Three returns give the
     ratio of the series and with it the place of its end: an orbit that Newton's method finds there, and
-    that attracts, is what the motion comes to.
+    that attracts, is what the solution comes to.
     """
     if len(trajectory) < 2 * lag + 1:
         return None

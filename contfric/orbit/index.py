@@ -134,7 +134,7 @@ def _sign(matrix: FloatArray) -> int | None:
 
 
 def index_at_infinity(model: Model, vector: FloatArray) -> int | None:
-    """Return the sum of the indices of all orbits of one period, by the motion at large amplitudes.
+    """Return the sum of the indices of all orbits of one period, by the solution at large amplitudes.
 
     None where that is not linear (the modes in motion have different derivatives, or they depend on the
     state), has a multiplier 1, or there is no excitation, or a state is reset.

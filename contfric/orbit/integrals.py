@@ -138,7 +138,7 @@ def add_to_joints(layout, whole, i, row, reset, on_joints, on_parameters, d_peri
 
     Parameters
     ----------
-    row : by start time, start state, duration, parameters and the extra one, behind the value
+    row : by start time, start state, duration, parameters and the extra one, after the value
     reset : derivatives of the reset in which the segment begins
     """
     count, m = on_joints.shape
@@ -205,7 +205,7 @@ def integrate(  # type: ignore[no-untyped-def]
     which : the parameters that move, none where no gradients are wanted
     extra : the parameter that follows those of the model
     level : share of the last coefficients at which a part is resolved
-    chained : 1 where the motion to a node starts at the node before
+    chained : 1 where the solution to a node starts at the node before
     out : shape (L,)
     on_joints : by the joints, shape (L, N, m), or (0, N, m) where no gradients are wanted
     on_parameters : by the parameters that move and the extra one, shape (L, len(which) + 1)

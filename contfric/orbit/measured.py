@@ -23,7 +23,7 @@ class MeasuredOrbit(Shown):
 
     @cached_property
     def outline(self) -> Outline:
-        """The slides of the motion, whatever itinerary it is solved with."""
+        """The slides of the solution, whatever itinerary it is solved with."""
         from contfric.orbit.slides import outline_of
 
         return outline_of(cast("Orbit", self))

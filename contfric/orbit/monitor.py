@@ -106,7 +106,7 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
 
 @helper
 def start_value(functions, layout, i, c, z, p, workspace):  # type: ignore[no-untyped-def]
-    """Return observable c where segment i begins, behind its reset."""
+    """Return observable c where segment i begins, after its reset."""
     n = z.shape[1] - 1
     apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     return functions.observe(
@@ -120,12 +120,12 @@ def joint_margin(functions, layout, k, z, p, workspace):  # type: ignore[no-unty
     i, surface = layout.joint[k, 0], layout.joint[k, 1]
     after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     c = layout.observables[surface]
-    if layout.joint[k, 3] == 1:  # where the segment begins, behind a reset
+    if layout.joint[k, 3] == 1:  # where the segment begins, after a reset
         value = start_value(functions, layout, i, c, z, p, workspace)
     else:
         value = functions.observe(c, after[0], after[1:], p, workspace.none, workspace.empty)
     level = functions.level(surface, p, workspace.none, workspace.empty)
-    # a hold behind a touch may be left where its load has the same height again: it does not end there
+    # a hold after a touch may be left where its load has the same height again: it does not end there
     column = layout.interior.shape[0] + layout.exits.shape[0] + k
     return layout.joint[k, 2] * (value - level) + equal_heights(
         layout, i, column, level, after[0] - z[i, 0]
@@ -332,7 +332,7 @@ def crossed(functions, layout, k, found, z, p, workspace, stationary):  # type: 
 def write_label(  # type: ignore[no-untyped-def]
     functions, layout, k, found, z, p, workspace, stationary, out, labels, followed
 ):
-    """Write label k, its distance behind the margins, and what is kept of it."""
+    """Write label k, its distance after the margins, and what is kept of it."""
     labels[k], out[count_margins(layout) + k], end = crossed(
         functions, layout, k, found, z, p, workspace, stationary
     )
@@ -342,7 +342,7 @@ def write_label(  # type: ignore[no-untyped-def]
 
 @helper
 def watch(functions, layout, z, p, workspace, stationary, out, labels, followed):  # type: ignore[no-untyped-def]
-    """Fill margins and labels of an orbit, and behind the margins the distances of the labels.
+    """Fill margins and labels of an orbit, and after the margins the distances of the labels.
 
     Stationary values are kept in ``followed``, if it has space for any. False if something is not finite.
     """

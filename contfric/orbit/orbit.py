@@ -148,7 +148,7 @@ class Orbit(MeasuredOrbit):
 
     @cached_property
     def begins(self) -> FloatArray:
-        """Start time and state of each segment of the whole orbit: its joints, behind resets.
+        """Start time and state of each segment of the whole orbit: its joints, after resets.
 
         Shape (segments, 1 + n).
         """

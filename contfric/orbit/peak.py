@@ -33,7 +33,7 @@ from contfric.orbit.stationary import (
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
-#: Where an extremum is reached: at a joint, behind the reset there, inside of a segment.
+#: Where an extremum is reached: at a joint, after the reset there, inside of a segment.
 JOINT, BEHIND, INSIDE = range(3)
 #: Places in what says that: the segment, which of the three, the time after its start; and the next value.
 SEGMENT, KIND, TIME, NEXT = range(4)

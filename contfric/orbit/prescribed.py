@@ -1,4 +1,4 @@
-"""The motion that takes prescribed outcomes at its joints, admissible or not, compiled.
+"""The solution that takes prescribed outcomes at its joints, admissible or not, compiled.
 
 Where a mode ends at a surface, the itinerary says what follows, not the state: each branch of a return map
 with a jump is so continued beyond the jump.
@@ -48,7 +48,7 @@ def next_joint(functions, layout, i, joint, p, within, none, empty, met):  # typ
 
 @kernel(types.boolean(FlowType, LayoutType, matrix, vector, i8, vector))
 def follow_itinerary(functions, layout, joints, p, rounds, end):  # type: ignore[no-untyped-def]
-    """Follow the motion that takes the outcomes of an itinerary from its first joint; False if it cannot.
+    """Follow the solution that takes the outcomes of an itinerary from its first joint; False if it cannot.
 
     Parameters
     ----------

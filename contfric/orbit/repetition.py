@@ -17,7 +17,7 @@ _SAME = 1e-8
 
 
 def shortest(orbit: Orbit) -> Orbit:
-    """Return the orbit of fewest periods that runs through the same motion; most often the same.
+    """Return the orbit of fewest periods that runs through the same solution; most often the same.
 
     Without an excitation its itinerary may repeat itself any number of times.
 

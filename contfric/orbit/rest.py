@@ -1,4 +1,4 @@
-"""Motions that come to rest, which are no periodic orbits: in a mode, or where surfaces meet."""
+"""Solutions that come to rest, which are no periodic orbits: in a mode, or where surfaces meet."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contfric.orbit.simulation import Trajectory
 #: A motion of which all events of a period are at one state, to rounding, is at rest if it does not move
 #: within a time either.
 _RESTS, _SHORT = 1e-13, 1e-1
-#: Turns smaller than this (relative to 1 + the states) are none: the motion has come to rest.
+#: Turns smaller than this (relative to 1 + the states) do not count: the solution has come to rest.
 _NO_SIZE = 1e-6
 #: Turns about a point: the last half of all events lie this near to each other (relative to 1 + the states),
 #: and the last quarter nearer than the one before it (by 2/3, where turns shrink like 1/n).
@@ -20,7 +20,7 @@ _WOUND, _SHRINKS = 1e-3, 0.8
 
 
 def check_rest(trajectory: Trajectory) -> None:
-    """Refuse a motion that has come to rest in a mode in which something could move.
+    """Refuse a solution that has come to rest in a mode in which something could move.
 
     Its rates are rounding then, and so are the events that it meets: all of a period are at one state.
     """
@@ -43,15 +43,15 @@ def _stays_at(trajectory: Trajectory) -> str:
 
 
 def is_point(orbit: Orbit) -> bool:
-    """Tell whether an orbit has no size: a motion that turns about the place where its surfaces meet."""
+    """Tell whether an orbit has no size: a solution that turns about the place where its surfaces meet."""
     states = np.concatenate([orbit.begins[:, 1:], orbit.ends[:, 1:]])
     return bool(np.max(np.ptp(states, axis=0)) < _NO_SIZE * (1.0 + np.max(np.abs(states))))
 
 
 def winds(trajectory: Trajectory) -> bool:
-    """Tell whether a motion with excitation winds into a point, in turns that shrink like 1/n.
+    """Tell whether a solution with excitation winds into a point, in turns that shrink like 1/n.
 
-    They take times like 1/n, too: within a time t the motion meets exp(t) events, and no period ends.
+    They take times like 1/n, too: within a time t the solution meets exp(t) events, and no period ends.
     """
     half, last = len(trajectory) // 2, 3 * len(trajectory) // 4
     before, lately = (
@@ -64,7 +64,7 @@ def winds(trajectory: Trajectory) -> bool:
 
 
 def comes_to_rest(trajectory: Trajectory) -> str:
-    """Return what is said of a motion that turns about the place where its surfaces meet."""
+    """Return what is said of a solution that turns about the place where its surfaces meet."""
     where = _place(trajectory.model, trajectory.states[-1])
     return (
         f"no periodic orbit: the motion comes to rest near {where}, where surfaces meet: it crosses them in "

@@ -1,7 +1,7 @@
 """Joints at which a disturbance is carried on whatever the rate of the exit, which may vanish there.
 
-Behind a joint at which the field jumps, a disturbance is multiplied by the saltation matrix, with the rate
-of the exit as divisor [1]_. Where a surface is only touched that rate is 0, and a segment behind it has no
+After a joint at which the field jumps, a disturbance is multiplied by the saltation matrix, with the rate
+of the exit as divisor [1]_. Where a surface is only touched that rate is 0, and a segment after it has no
 length. Two kinds of joints have a limit there, in which the rate does not stand:
 
 * the field is continuous (a contact with a spring; a slider that comes to rest; a section): the identity;

@@ -20,7 +20,7 @@ _MOST_SAMPLES = 10_000_000
 
 
 def state_within(orbit: Orbit, i: int, duration: float) -> FloatArray:
-    """Return the state in a segment of the whole orbit, a duration behind its start, shape (n,)."""
+    """Return the state in a segment of the whole orbit, a duration after its start, shape (n,)."""
     start = orbit.begins[i]
     return orbit.flow.state(orbit.itinerary[i][0], float(start[0]), start[1:], duration)
 

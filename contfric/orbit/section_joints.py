@@ -1,7 +1,7 @@
 """An orbit in one mode with joints on a section as well, for what follows when its other joints vanish.
 
-An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth behind the event.
-So that both are itineraries of one motion, joints are put where the motion crosses a section.
+An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth after the event.
+So that both are itineraries of one solution, joints are put where the solution crosses a section.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
 
     down = max(ways[-1], key=lambda c: abs(c.rate)).time
     fast = (1.0 - _AS_FAST) * max(c.rate for c in ways[1])
-    half = down + 0.5 * whole.period / turns  # where a symmetric motion has the image
+    half = down + 0.5 * whole.period / turns  # where a symmetric solution has the image
     up = min((c for c in ways[1] if c.rate >= fast), key=lambda c: apart(c, half)).time
     starts = [
         (way, t + k * whole.period / turns)

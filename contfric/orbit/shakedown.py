@@ -1,4 +1,4 @@
-"""A motion in which a contact slips to one side only, a little less in each period, until it sticks.
+"""A solution in which a contact slips to one side only, a little less in each period, until it sticks.
 
 Such a motion is not periodic, however near its returns are: its creep ``c`` a period falls with the distance
 ``e`` that is left. A massless slider slips by the excess of its stretch, ``c = k e``. A mass that sticks lets
@@ -32,11 +32,11 @@ def creeps(trajectory: Trajectory, lag: int) -> bool:
 
 
 def beyond_creep(trajectory: Trajectory, lag: int) -> tuple[float, FloatArray] | None:
-    """Return time and state behind the end of a creep; None while it does not follow its law.
+    """Return time and state after the end of a creep; None while it does not follow its law.
 
     Parameters
     ----------
-    lag : events after which the motion nearly returns
+    lag : events after which the solution nearly returns
     """
     model, itinerary = trajectory.model, trajectory.itinerary[-lag:]
     modes = only_grows(model, itinerary)

@@ -41,13 +41,15 @@ class SimulationEnd(str, Enum):
 
     EVENTS = "the number of events asked for was reached"
     TIME = "the time asked for was reached"
-    HELD = "the motion stays on a surface for ever (a mass at rest): nothing releases it"
+    HELD = "the solution stays on a surface for ever (a mass at rest): nothing releases it"
     IMPOSSIBLE = (
         "no mode holds where the motion has come to, or events follow each other at once, so that time does "
         "not go on"
     )
     INFINITE = "the solution diverged"
-    QUIET = "the motion meets no surface any more: it has come to an equilibrium, or never changes"
+    QUIET = (
+        "the solution meets no surface any more: it has come to an equilibrium, or never changes"
+    )
     CHATTER = (
         "impacts follow each other faster and faster (chatter): infinitely many in finite time, and the "
         "mass stays at the wall"

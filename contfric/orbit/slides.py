@@ -1,4 +1,4 @@
-"""The slides of a motion: what it is, whatever itinerary it is solved with.
+"""The slides of a solution: what it is, whatever itinerary it is solved with.
 
 A motion at an event solves several itineraries. They differ by segments of no length, and by touches of rest
 inside of a slide. The slides of some length, joined over such touches, are the same for all of them.
@@ -14,7 +14,7 @@ import numpy as np
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 
-#: Parts of a cycle that agree to this (nondimensional) are the same motion: the root of rounding.
+#: Parts of a cycle that agree to this (nondimensional) are the same solution: the root of rounding.
 SAME_MOTION = 1e-5
 #: Segments shorter than this have no length: a slide that vanishes is located to the third root of rounding
 #: (times its conditioning), a hold at a touch of rest to the second.
@@ -25,13 +25,13 @@ def resting_modes(orbit: Orbit) -> set[str]:
     """Return the modes of an orbit in which nothing moves.
 
     One in which a contact rests is not enough: of several contacts, or masses, one nearly always does. And
-    it does not depend on the itinerary, so that all itineraries of one motion have the same slides.
+    it does not depend on the itinerary, so that all itineraries of one solution have the same slides.
     """
     return {mode for mode, _ in orbit.itinerary if orbit.model.is_at_rest(mode)}
 
 
 def time_unit(orbit: Orbit) -> float:
-    """Return the time that short times are a share of: 1, or the period of a motion that is faster.
+    """Return the time that short times are a share of: 1, or the period of a solution that is faster.
 
     In seconds a converter switches within microseconds: times of 1e-3 are long there.
     """
@@ -80,7 +80,7 @@ def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False)
 
 
 def repetitions(orbit: Orbit, slides: list[int]) -> int:
-    """Return how often the motion of a whole orbit repeats itself in its period.
+    """Return how often the solution of a whole orbit repeats itself in its period.
 
     Without an excitation that may be any part of its slides.
     """
@@ -91,7 +91,7 @@ def repetitions(orbit: Orbit, slides: list[int]) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """The starts of the slides of a motion, over its shortest period.
+    """The starts of the slides of a solution, over its shortest period.
 
     Attributes
     ----------
@@ -113,9 +113,9 @@ class Outline:
     ordered: bool = True
 
     def apart(self, other: Outline) -> float:
-        """Return how far two motions are apart, up to symmetry; infinite if they are of another kind.
+        """Return how far two solutions are apart, up to symmetry; infinite if they are of another kind.
 
-        Without an excitation a motion is told by any of its states, however often it is run through.
+        Without an excitation a solution is told by any of its states, however often it is run through.
         """
         alike = self.periods == other.periods and len(self.starts) == len(other.starts)
         if np.isfinite(self.cycle) and not alike:
@@ -137,14 +137,14 @@ class Outline:
         return cycles
 
     def repeated(self, periods: int) -> Outline:
-        """Return the same motion over a multiple of its periods."""
+        """Return the same solution over a multiple of its periods."""
         times = periods // self.periods
         starts, images = np.tile(self.starts, (times, 1)), np.tile(self.images, (times, 1))
         return replace(self, periods=periods, starts=starts, images=images)
 
     @cached_property
     def apart_from_image(self) -> float:
-        """How far the motion is from its symmetry image."""
+        """How far the solution is from its symmetry image."""
         return self._apart_from(self.images)
 
 
@@ -196,7 +196,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
 
 
 def _impacts(whole: Orbit) -> FloatArray:
-    """Return time and state in front of each reset that changes the state: a grazing impact is none."""
+    """Return time and state in front of each reset that changes the state: a grazing impact changes none."""
     behind = np.roll(whole.begins[:, 1:], -1, axis=0)
     jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_MOTION
     struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.itinerary]

@@ -13,7 +13,7 @@ from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import bits_of
 
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
-#: domain (behind a wall, or on a surface that motion does not leave), the next.
+#: domain (after a wall, or on a surface that motion does not leave), the next.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
 #: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
 #: nobody may have written, and then further out.

@@ -39,7 +39,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
     """Return the displacement wherever an orbit crosses a surface or kink, in order, shape (crossings,).
 
     Inside its segments and at its joints, impacts among them; by the first roots of the flow. For models
-    whose motion is not cut at its stops.
+    whose solution is not cut at its stops.
     """
     model, flow = orbit.model, orbit.flow
     observable, level = surface, 0.0

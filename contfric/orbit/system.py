@@ -7,9 +7,9 @@ admissible) are
 * interior: between its joints a segment does not cross a surface that bounds its mode,
 * exit: it meets its exit surface from inside, with a rate that does not vanish,
 * joint: where it exits, the other observables are in the domain that the signature names,
-* entry: where it begins behind a reset, the observables that the reset changes are in its mode.
+* entry: where it begins after a reset, the observables that the reset changes are in its mode.
 
-Crossings of transparent surfaces inside a segment do not matter to the motion; they label it.
+Crossings of transparent surfaces inside a segment do not matter to the solution; they label it.
 
 A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
@@ -232,7 +232,7 @@ def _turn(model: Model, periods: int, half: bool) -> float:
 
 
 def following_modes(model: Model, itinerary: Itinerary, half: bool) -> list[str]:
-    """Return the mode behind each segment of a turn; behind half an orbit it is the image of the first."""
+    """Return the mode after each segment of a turn; behind half an orbit it is the image of the first."""
     first = mirror_mode(model)[itinerary[0][0]] if half else itinerary[0][0]
     return [*(mode for mode, _ in itinerary[1:]), first]
 
@@ -252,7 +252,7 @@ def _segment_domains(
 
 
 def _leads_to(index: int, after: str, holds: tuple[Hold, ...]) -> str:
-    """Mode that a segment leads to by the transitions: behind a hold, but where rest is touched (GS).
+    """Mode that a segment leads to by the transitions: after a hold, but where rest is touched (GS).
 
     The load at a stop on a surface falls: the slide comes from beyond it, where it would reverse.
     """
@@ -365,7 +365,7 @@ def _label_rows(
 
 
 def _landed(model: Model, entry: str, c: int) -> str | None:
-    """Return the surface of observable c that a segment begins on, behind a reset; else that of its entry."""
+    """Return the surface of observable c that a segment begins on, after a reset; else that of its entry."""
     reset = model.reset_by_surface.get(entry)
     if reset is None:
         return entry

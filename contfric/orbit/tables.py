@@ -39,7 +39,7 @@ class Tables(NamedTuple):
     sliding : whether a mode slides on a surface; 2 if it may do so for more than a period
     lies_on : surfaces that a mode moves on, as bits
     kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
-    chatters : mode that infinitely many impacts lead to, by (mode behind an impact, surface); -1 if none,
+    chatters : mode that infinitely many impacts lead to, by (mode after an impact, surface); -1 if none,
         shape (modes, surfaces)
     flights : mode that a mode of chatter is left for, -1 of others; behind these, where impacts pass their
         surface, that which it is left for below it
@@ -157,7 +157,7 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
         add(name, surface, model.domain_by_name[name].signs, {surface}, target)
     for (name, surface), targets in model.targets.items():
         if surface in model.reset_by_surface:
-            for after in targets:  # behind a reset the signs of the mapped state tell the domain
+            for after in targets:  # after a reset the signs of the mapped state tell the domain
                 if model.domain_by_name[after].own_mode in model.chatter_by_mode:
                     continue  # found by following the impacts
                 signs, before = model.domain_by_name[after].signs, model.domain_by_name[name].signs
@@ -198,7 +198,7 @@ def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:
 
 
 def sides_of(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -> tuple[int, int]:
-    """Return the sides of a domain as (mask, value); those that a motion lies on are not asked for."""
+    """Return the sides of a domain as (mask, value); those that a solution lies on are not asked for."""
     asked = [
         s
         for s, sign in signs.items()
@@ -234,7 +234,7 @@ def _surfaces_kept(model: Model, met: str) -> int:
 
 
 def _landed(model: Model, met: str) -> Collection[str]:
-    """Return the surfaces that the state is on behind one that is met."""
+    """Return the surfaces that the state is on after one that is met."""
     reset = model.reset_by_surface.get(met)
     return {met} if reset is None else reset.lands
 

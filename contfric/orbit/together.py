@@ -1,4 +1,4 @@
-"""Surfaces that a motion meets together, to rounding: which mode follows, compiled."""
+"""Surfaces that a solution meets together, to rounding: which mode follows, compiled."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from contfric.compiled import helper
 from contfric.orbit.tables import MOST_SURFACES
 
 #: Distance, relative to 1 + its level, within which a surface is met together with another one: far above
-#: what rounding leaves of the same motion, far below what tells two events apart.
+#: what rounding leaves of the same solution, far below what tells two events apart.
 _TOGETHER = 1e-12
 
 

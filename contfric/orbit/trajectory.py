@@ -58,7 +58,7 @@ _WIDER = 4.0
 _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
-#: 1 + the wall that was met last if no other event came since, the speed behind that impact, and the unit of
+#: 1 + the wall that was met last if no other event came since, the speed after that impact, and the unit of
 #: time of a model without excitation (1 if less).
 CARRIED = 10
 STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED, UNIT = range(CARRIED)
@@ -115,7 +115,7 @@ def hit_within(functions, tables, mode, on, t, y, p, longest, workspace):  # typ
 
 @helper
 def never_left(tables, mode):  # type: ignore[no-untyped-def]
-    """Return how a motion ends in a mode that it never leaves."""
+    """Return how a solution ends in a mode that it never leaves."""
     return HELD if tables.sliding[mode] != 0 else QUIET
 
 
@@ -232,7 +232,7 @@ def write_event(rows, event, mode, surface, cycle, t):  # type: ignore[no-untype
 
 @helper
 def sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Return the sides of all surfaces behind an event, by which the mode that follows is known."""
+    """Return the sides of all surfaces after an event, by which the mode that follows is known."""
     if tables.flights[mode] >= 0:
         return code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
     landed, none, empty = tables.landed[surface], workspace.none, workspace.empty
@@ -245,8 +245,8 @@ def behind_impact(  # type: ignore[no-untyped-def]
 ):
     """Return (whether the wall is pressed from now on, mode of the chatter that begins; -1 if none does).
 
-    All impacts behind another event, or behind a throw, are one chatter, or none is. ``struck_at`` is the
-    state before the impact, y that behind it.
+    All impacts after another event, or after a throw, are one chatter, or none is. ``struck_at`` is the
+    state before the impact, y that after it.
     """
     pressed = is_pressed(
         functions, tables, mode, surface, target, t, struck_at, y, p, unit, workspace
@@ -291,7 +291,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         cycle += turns
         if surface < 0:
             wall = int(carry[BOUNCED]) - 1
-            # the impacts that follow are another segment: a mode of chatter begins behind an impact
+            # the impacts that follow are another segment: a mode of chatter begins after an impact
             chatters = tables.flights[mode] >= 0 and wall >= 0
             if chatters and in_flight(functions, tables, mode, wall, t, y, p, workspace):
                 carry[BOUNCED] = 0.0

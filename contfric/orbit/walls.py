@@ -17,7 +17,7 @@ _RESTS = 1e-9
 
 @helper
 def is_pressed(functions, tables, mode, surface, following, t, before, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether a state behind an impact is driven back at once: its next flight is too short to resolve.
+    """Tell whether a state after an impact is driven back at once: its next flight is too short to resolve.
 
     It is if the mean rate of the gap over the shortest flight does not lead away from the wall. Impacts
     with a small restitution come to that before there are many, one without restitution at once; a first

@@ -101,7 +101,7 @@ def plot_diagram_row(
     legend : bool
         Whether to draw the legend.
     overlay : Sweep, optional
-        Simulated points of the same parameter, drawn behind the branches.
+        Simulated points of the same parameter, drawn after the branches.
     names, colours : mapping, optional
         What branches are called in the legend, and colours of theirs, by their names.
     linestyles : mapping, optional
@@ -148,7 +148,7 @@ def plot_diagram(
     fig : Figure, optional
         An empty figure to draw in; a new one by default.
     overlay : Sweep, optional
-        Simulated points of the same parameter, drawn behind the branches.
+        Simulated points of the same parameter, drawn after the branches.
     title : str, optional
         What stands above; names of parameters become symbols. The fixed parameters by default.
     legend, names, colours, linestyles, inset : optional

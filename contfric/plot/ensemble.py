@@ -34,7 +34,7 @@ _STABLE_AREA, _UNSTABLE_AREA = 0.30, 0.14
 
 
 def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = False) -> Axes:
-    r"""Draw the bands of an ensemble: medians as lines within areas of 90 %, and the places of events.
+    r"""Draw the bands of an ensemble: medians as lines within areas of 90 %, and the locations of events.
 
     Parameters
     ----------

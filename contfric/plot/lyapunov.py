@@ -1,4 +1,4 @@
-"""Lyapunov maps: where motions are chaotic, and how much."""
+"""Lyapunov maps: where solutions are chaotic, and how much."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Colours of positive exponents: from light to dark, so that the map reads in grey as well.
 _SHADES = "magma_r"
-#: Where the motion grows without bound, and where nothing was computed.
+#: Where the solution grows without bound, and where nothing was computed.
 _UNBOUNDED, _MISSING = lighter(GREY, 0.35), lighter(GREY, 0.75)
 
 

@@ -182,7 +182,7 @@ def draw_arrow(ax: Axes, across: Sequence[FloatArray], up: Sequence[FloatArray])
 
 
 def draw_stops(ax: Axes, orbit: Orbit, across: str, up: str) -> None:
-    """Mark stops: filled where a stick begins, open where the motion reverses."""
+    """Mark stops: filled where a stick begins, open where the solution reverses."""
     for sticks, joint in _stops(orbit):
         x, y = (value_of(orbit, name, float(joint[0]), joint[1:]) for name in (across, up))
         marker = _stop_marker(sticks, [x], [y])

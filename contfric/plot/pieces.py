@@ -89,7 +89,7 @@ def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tupl
             [observe(orbit, surface.observable, t, y) for t, y in zip(times, states, strict=True)]
         )
         gap -= limit
-        # a sample on the surface (a joint, or the middle of a motion) has no side
+        # a sample on the surface (a joint, or the middle of a solution) has no side
         sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
         for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):
             bracket = times[sided[k : k + 2]]

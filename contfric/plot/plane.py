@@ -126,7 +126,7 @@ def _draw(
             colour, width = _LOOKS.get(kind, (GREY, 1.0))
             if (
                 stable or first
-            ):  # another itinerary for the same motion shows where it is stable, no more
+            ):  # another itinerary for the same solution shows where it is stable, no more
                 style = STABLE if stable else UNSTABLE
                 (line,) = ax.plot(*values.T, color=colour, linewidth=width, linestyle=style)
                 line.set_gid(curve.label)

@@ -1,4 +1,4 @@
-"""Sweeps: simulated points along a parameter, alone or behind the branches of a diagram."""
+"""Sweeps: simulated points along a parameter, alone or after the branches of a diagram."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
 def draw_overlay(
     axes: Sequence[Axes], rows: Sequence[QuantityLike], parameter: str, overlay: Sweep | None
 ) -> None:
-    """Draw the points of a sweep behind the rows of a diagram; nothing if there is none.
+    """Draw the points of a sweep after the rows of a diagram; nothing if there is none.
 
     Raises
     ------

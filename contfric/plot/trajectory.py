@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Widths of lines; many turns over each other are told apart by thin ones.
 _THIN, _POINT = 0.8, 3.0
-#: Share of the period that the tail behind a moving point shows.
+#: Share of the period that the tail after a moving point shows.
 _TAIL = 0.08
 #: Frames of an animation: minutes of film, and what a gif of some megabytes holds.
 _MOST_FRAMES = 2000

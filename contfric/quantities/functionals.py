@@ -44,7 +44,7 @@ _WIDTHS = (1e-4, 1e-6, 1e-8)
 
 @dataclass(eq=False)
 class Measuring:
-    """One measurement: the motion, and where derivatives turned out to be one-sided.
+    """One measurement: the solution, and where derivatives turned out to be one-sided.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Measuring:
     def _work(self, asked: Functional) -> Dual:
         """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
         contact = asked.text
-        # where it has just begun to slide all values are small: beside those of any mode they are rounding
+        # where it has just begun to slide all values are small: next to those of any mode they are rounding
         laws = self.inside.powers(contact)
         size = max(least_size(self.motion.pieces, function) for function in laws)
         total = self._integral(asked, self.inside.power(contact), size)
@@ -241,7 +241,7 @@ class Measuring:
         """Return the largest of some values; their derivatives are asked for by number.
 
         Where several are the largest, and move differently, the derivatives of both sides differ: that
-        ahead is the largest derivative, that behind the smallest.
+        ahead is the largest derivative, that after the smallest.
         """
         best = float(np.max(values))
         if not self.motion.count:
@@ -258,12 +258,12 @@ class Measuring:
 
     @cached_property
     def _still(self) -> Motion:
-        """The same motion without directions."""
+        """The same solution without directions."""
         return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
 
     @cached_property
     def _timed(self) -> Motion:
-        """The same motion in one direction in which nothing moves: for rates, its derivatives by time."""
+        """The same solution in one direction in which nothing moves: for rates, its derivatives by time."""
         joints, vector = self.motion.orbit.joints, self.motion.orbit.vector
         nothing = np.zeros((*joints.shape, 1)), np.zeros((len(vector), 1))
         return Motion(self.motion.orbit, Directions(*nothing))

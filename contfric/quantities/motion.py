@@ -116,7 +116,7 @@ class Segment(Place):
     ----------
     model, vector, d_vector : the model, its parameters, and how they move, shape (parameters, D)
     index, mode : which segment of the whole orbit, and its mode
-    start, state, lasts : start time, start state behind its reset, and duration
+    start, state, lasts : start time, start state after its reset, and duration
     d_start, d_state, d_lasts : how they move, shapes (D,), (n, D) and (D,)
     """
 

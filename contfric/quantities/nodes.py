@@ -11,7 +11,7 @@ from contfric.flow.layouts import FlowType
 
 @helper
 def carry(jac, begin_time, begin, d_time, d_vector, out):  # type: ignore[no-untyped-def]
-    """Write how a state moves, (n, D + 1), whose motion starts where time and state move by ``begin``."""
+    """Write how a state moves, (n, D + 1), whose solution starts where time and state move by ``begin``."""
     n, count, free = out.shape[0], out.shape[1] - 1, d_vector.shape[0]
     for i in range(n):
         for d in range(count):
@@ -58,14 +58,14 @@ def move(  # type: ignore[no-untyped-def]
     modes, starts, states, lasts : the segments; shapes (N,), (N,), (N, n), (N,)
     d_starts, d_states, d_lasts : how they move, shapes (N, D), (N, n, D), (N, D)
     which, d_vector : the parameters that move, and how, shape (moving, D)
-    chained : whether the motion to a node starts at the node before, where that is earlier
+    chained : whether the solution to a node starts at the node before, where that is earlier
     where, shares : segment of each node, and its share of that, shape (k,)
     times, d_times : shapes (k,) and (k, D + 1), or (k, 0) where no derivatives are wanted
     out, slopes : states, shapes (k, n) and (k, n, D + 1)
     """
     n, exact = states.shape[1], d_times.shape[1] > 0
     jac = np.empty((n if exact else 0, 2 + n + which.shape[0]))
-    before = -1  # the node that the motion starts at; a segment's own start
+    before = -1  # the node that the solution starts at; a segment's own start
     for k in range(where.shape[0]):
         s = where[k]
         times[k] = starts[s] + shares[k] * lasts[s]

@@ -5,14 +5,33 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import helper
-
-#: What stands at the beginning of an expression: a number, time, a state, a parameter, an observable.
-CONSTANT, TIME, STATE, PARAMETER, OBSERVABLE = range(5)
-#: What is made of others.
-NEGATE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, WHERE = range(5, 12)
-#: Functions of one argument, in the order of :data:`contfric.models.grammar.UNARY`.
-FIRST_FUNCTION = 12
-SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN = range(12, 26)
+from contfric.quantities.codes import (
+    ABS,
+    ACOS,
+    ADD,
+    ASIN,
+    ATAN,
+    CONSTANT,
+    COS,
+    COSH,
+    DIVIDE,
+    EXP,
+    LOG,
+    MULTIPLY,
+    NEGATE,
+    OBSERVABLE,
+    PARAMETER,
+    POWER,
+    SIN,
+    SINH,
+    SQRT,
+    STATE,
+    SUBTRACT,
+    TAN,
+    TANH,
+    TIME,
+    WHERE,
+)
 
 
 @helper

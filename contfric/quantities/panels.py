@@ -110,7 +110,7 @@ class Resolved:
         return found
 
     def _moving(self, cut: Cut) -> FloatArray:
-        """Return what the motion of a jump adds: the jump times how far its time moves against the segment.
+        """Return what the solution of a jump adds: the jump times how far its time moves against the segment.
 
         At the jump the argument a is zero; a fixed share moves it by da, time by its rate, so that the jump
         moves by -da / rate against that share.

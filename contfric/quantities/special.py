@@ -37,7 +37,7 @@ def sticking(measuring: Measuring) -> Dual:
 
 
 def impact_velocity(measuring: Measuring) -> Dual:
-    """Return the largest speed at which a surface is met that sends the motion back: a wall.
+    """Return the largest speed at which a surface is met that sends the solution back: a wall.
 
     The speed is the rate of the surface's observable before its reset.
     """

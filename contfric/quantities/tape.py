@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from contfric.models.grammar import TIME as TIME_NAME
 from contfric.models.grammar import UNARY, Algebra, Scope
-from contfric.quantities.operations import (
+from contfric.quantities.codes import (
     ADD,
     CONSTANT,
     DIVIDE,

@@ -56,7 +56,7 @@ class _Advance:
         return time.monotonic() - self.since > _PATIENCE
 
     def submit(self, function: Callable[[], object]) -> bool:
-        """Begin a call in the other thread, behind the one that is at work there; False if one waits."""
+        """Begin a call in the other thread, after the one that is at work there; False if one waits."""
         self.jobs = [job for job in self.jobs if not job.done()]
         if len(self.jobs) > 1:
             return False

@@ -1,6 +1,6 @@
 """Plain data and the package's own data classes as bytes, and back, to the last bit.
 
-What belongs to a computation is written as a tree (JSON) of tagged nodes, with its arrays behind it. Reading
+What belongs to a computation is written as a tree (JSON) of tagged nodes, with its arrays after it. Reading
 it runs no code but that of this package (no pickle): only data classes, named tuples and enumerations of
 contfric are made again, field by field. An object that is met twice is one object again afterwards, and one
 that the reader has already (an argument of the computation) is that very object.
@@ -119,7 +119,7 @@ class Writer:
         return self._node(getattr(value, name))
 
     def _items(self, values: list[Any]) -> list[Any]:
-        """Return the nodes of a list; many objects of one shape behind the first one are one node."""
+        """Return the nodes of a list; many objects of one shape after the first one are one node."""
         first, rest = values[:1], values[1:]
         columns = self._columns(rest) if len(rest) >= _MANY else None
         if columns is None:

@@ -85,7 +85,7 @@ def has_sense(functions, cut, mode, t, y, p, workspace):  # type: ignore[no-unty
 
 @helper
 def set_strobe(cut, period, segment, strobe):  # type: ignore[no-untyped-def]
-    """Set the number of the first strobe behind the start of the segment."""
+    """Set the number of the first strobe after the start of the segment."""
     strobe[0] = segment.at[2]
     if cut.phase * period <= segment.time[0]:
         strobe[0] += 1

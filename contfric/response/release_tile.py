@@ -56,7 +56,7 @@ class ReleaseTile(Task):
     model : Model
     vector : parameters
     joints : joints that are a release, by mode and exit surface, shape (modes, surfaces)
-    following, on : mode behind a release, and the surfaces that it starts on, as bits
+    following, on : mode after a release, and the surfaces that it starts on, as bits
     times, states : the releases, shapes (k,) and (k, n)
     periods : periods within which the next one has to come
     """

@@ -127,7 +127,7 @@ class ReleaseMap(Tabled):
     returns : ndarray, shape (k,)
         Time until then.
     branch : ndarray, shape (k,)
-        Number of the branch: between two points of one branch the motion has the same segments.
+        Number of the branch: between two points of one branch the solution has the same segments.
     states : ndarray, shape (k, n)
         State at the release.
     complete : bool

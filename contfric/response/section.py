@@ -75,7 +75,7 @@ _FACTOR, _OFFSET = 6364136223846793005, 1442695040888963407
 
 @helper
 def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws):  # type: ignore[no-untyped-def]
-    """Begin the next segment behind a joint."""
+    """Begin the next segment after a joint."""
     segment, workspace = ws.segment, ws.state
     copy_state(y, ws.found)
     if tables.bounds[mode, surface] == 2:

@@ -32,7 +32,7 @@ class Targets(NamedTuple):
     Attributes
     ----------
     key : mode and surface, shape (k,)
-    z : phase and state, behind a reset, shape (k, 1 + n)
+    z : phase and state, after a reset, shape (k, 1 + n)
     owner : number of the orbit, shape (k,)
     radius : distance that counts as convergence, shape (k,)
     """

@@ -35,7 +35,7 @@ class Edit:
     ----------
     dropped : segments that go
     renamed : new exits of segments
-    inserted : segments that come in behind others
+    inserted : segments that come in after others
     """
 
     dropped: frozenset[int] = frozenset()
@@ -79,12 +79,12 @@ def drop(*segments: int) -> Edit:
 
 
 def insert(behind: int, *pairs: ReducedPair) -> Edit:
-    """Return the edit that puts segments behind one."""
+    """Return the edit that puts segments after one."""
     return Edit(inserted={behind: pairs})
 
 
 def split(segment: int, exit_surface: str, *pairs: ReducedPair) -> Edit:
-    """Return the edit that ends a segment at another surface, with others behind it."""
+    """Return the edit that ends a segment at another surface, with others after it."""
     return Edit(renamed={segment: exit_surface}, inserted={segment: pairs} if pairs else {})
 
 
@@ -110,7 +110,7 @@ def edited_pieces(
 ) -> list[tuple[tuple[int, int], ReducedPair]]:
     """Return the segments after an edit, each with where it comes from.
 
-    (segment, -1) for one that was there, (segment, k) for the k-th one put in behind a segment.
+    (segment, -1) for one that was there, (segment, k) for the k-th one put in after a segment.
     """
     pieces: list[tuple[tuple[int, int], ReducedPair]] = []
     for index, (mode, exit_) in enumerate(itinerary):

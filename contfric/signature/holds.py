@@ -2,7 +2,7 @@
 
 Where static friction exceeds the kinetic one, a mass at rest that bears a load between the two may leave
 at any instant (equation (2) of the reference, read as a differential inclusion). The rule "it is held
-until the load reaches the static limit" selects one of these motions, the stick. A **hold** is another
+until the load reaches the static limit" selects one of these solutions, the stick. A **hold** is another
 one: it leaves at a free time, and is pinned at its start, so that orbits with a hold form a curve in one
 parameter. See ``docs/bridges.md``.
 

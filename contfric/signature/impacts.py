@@ -1,10 +1,10 @@
 """Impacts and other resets in a signature: what stands between two domains.
 
 ``free+ -> impact@wall -> free-``
-    the motion in ``free+`` meets the surface ``wall``, where its state is mapped, and goes on in
+    the solution in ``free+`` meets the surface ``wall``, where its state is mapped, and goes on in
     ``free-``: from the wall, or through it.
 ``rest -> reset@threshold``
-    the same where the state behind it is somewhere else, off the surface: a firing, a tick of a clock.
+    the same where the state after it is somewhere else, off the surface: a firing, a tick of a clock.
 
 It takes no time and is not a segment. It is written because the domains before and after it do not tell: both
 may be the same, or joined by another surface as well. In a reduced itinerary it is the exit of the segment
@@ -74,7 +74,7 @@ def impact_fault(model: Model, segments: Sequence[str], index: int) -> str | Non
     possible = model.targets.get((before, surface), ())
     if after not in possible:
         return (
-            f"'{impact}' cannot lead from {before} to {after}; behind it can come: "
+            f"'{impact}' cannot lead from {before} to {after}; after it can come: "
             f"{', '.join(possible) or 'nothing'}"
         )
     return None

@@ -151,7 +151,7 @@ class Signature(Shown):
 
     @property
     def resets(self) -> int:
-        """Number of other resets: behind them the state is somewhere else."""
+        """Number of other resets: after them the state is somewhere else."""
         return sum(is_impact(s) and not stays_on(self.model, s) for s in self.segments)
 
     @cached_property

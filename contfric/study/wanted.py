@@ -55,7 +55,7 @@ def row_name(row: Row | str) -> str:
 
 
 # YAML has texts where Python has enumerations: these fields alone are converted
-# (a text that is none of them is a quantity, which the model has or has not)
+# (a text that is not one of them is a quantity, which the model has or has not)
 _Quantity = Annotated[str, Field(min_length=1)]
 _Left = Field(union_mode="left_to_right")
 Wants = list[Annotated[Annotated[Want, Field(strict=False)] | _Quantity, _Left]]

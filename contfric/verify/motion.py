@@ -1,4 +1,4 @@
-"""The motion: x'' + 2 zeta x' + x = f(t) - s S while s = sgn x' is not 0, x' = 0 while |x - f| <= S0.
+"""The solution: x'' + 2 zeta x' + x = f(t) - s S while s = sgn x' is not 0, x' = 0 while |x - f| <= S0.
 
 A slide is ``x = -s S + (x_0 + s S) C + r``, ``C = D' + 2 zeta D``, D = exp[l1, l2] a divided difference of
 exp(l tau) at the free exponents; a wave a cos(w t) adds ``Re a exp(i w t_0) exp[l1, l2, i w]`` to r.
@@ -60,7 +60,7 @@ def sinc(x: Any) -> Any:
 
 
 class Scene:
-    """The parameters and segments of a file, and their motion; joints are (phase of the excitation, x)."""
+    """The parameters and segments of a file, and their solution; joints are (phase of the excitation, x)."""
 
     def __init__(self, data: dict[str, Any], value: Any) -> None:
         periods, self.half = data["periods"], data["half"]

@@ -27,7 +27,7 @@ SCENES = {
 #: Figure -> scene, kind at which the bridge begins and ends, title.
 FIGURES = {
     "SS": ("two mirrored holds", "SS: held at both stops, on $F^-$ and on $F^+$"),
-    "AS": ("third harmonic", "AS: held behind a touch of the limit"),
+    "AS": ("third harmonic", "AS: held after a touch of the limit"),
     "GS": ("third harmonic", "GS: held at a touch of rest"),
 }
 #: Tips this near to each other (of the range) are at one event.
@@ -51,7 +51,7 @@ def bridge_of(scene: str, kind: str) -> cf.Branch:
 
 
 def apart(one: cf.Orbit, other: cf.Orbit) -> float:
-    """Distance of two motions, up to whole periods and the mirror image."""
+    """Distance of two solutions, up to whole periods and the mirror image."""
     if other.periods > one.periods:
         one, other = other, one
     forcing = one.period / one.periods
@@ -177,7 +177,7 @@ def _load(ax, orbit: cf.Orbit) -> None:  # type: ignore[no-untyped-def]
 def table() -> str:
     """The table of the page."""
     lines = [
-        "| scene | bridge | event | value | meets | difference in the parameter | in the motion |",
+        "| scene | bridge | event | value | meets | difference in the parameter | in the solution |",
         "|---|---|---|---|---|---|---|",
     ]
     lines += [

@@ -1,6 +1,6 @@
 """The page on chaos: what the paper says of it, measured; ``make gallery``.
 
-Maps and lines of Lyapunov exponents from the paper's initial state (1 + 0.9 S0, 0). Motions that are
+Maps and lines of Lyapunov exponents from the paper's initial state (1 + 0.9 S0, 0). Solutions that are
 chaotic over 600 periods are followed for 10,000 more, so that chaotic transients are told from chaos.
 """
 
@@ -26,7 +26,7 @@ CASES = (
     (0.4, 0.05, (0.1, 0.6), 0.28),
     (0.4, -0.05, (0.1, 0.6), 0.32),
 )
-#: Points along each side of a map, and periods that a chaotic motion is followed further.
+#: Points along each side of a map, and periods that a chaotic solution is followed further.
 SIDE, CONFIRM = 100, 10_000
 
 

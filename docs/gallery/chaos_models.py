@@ -1,4 +1,4 @@
-"""The page on chaos of integrated models: maps, chaotic motions, period doublings; ``make gallery``.
+"""The page on chaos of integrated models: maps, chaotic solutions, period doublings; ``make gallery``.
 
 Everything goes through ``lyapunov_map`` and ``lyapunov_exponent``, as for the model in closed form.
 """
@@ -21,7 +21,7 @@ MAPS = {
     "popp": ({"omega": (0.6, 2.0, 60), "F": (0.05, 0.35, 40)}, {}, "chaos-popp.png"),
     "impact": ({"w": (0.5, 5.0, 60), "d": (-0.4, 1.0, 40)}, {}, "chaos-impact.png"),
 }
-#: Chaotic motions, one of each kind: model, parameters, periods.
+#: Chaotic solutions, one of each kind: model, parameters, periods.
 CHAOS = (
     ("popp", "slides and sticks, no jump", {"omega": 1.69, "F": 0.1}, 2000),
     ("impact", "impacts", {"w": 2.8, "d": 0.0}, 2000),
@@ -55,7 +55,7 @@ def table_of_maps() -> list[str]:
     """Compute the maps, draw them, and return the table of what is in them."""
     from contfric.plot.save import new_figure, save_figure
 
-    lines = ["| model | points | seconds | what the motions are |", "|---|---|---|---|"]
+    lines = ["| model | points | seconds | what the solutions are |", "|---|---|---|---|"]
     for model, (_, _, file) in MAPS.items():
         found, seconds = map_of(model)
         figure = new_figure(6.4, 4.6)
@@ -69,7 +69,7 @@ def table_of_maps() -> list[str]:
 
 
 def table_of_chaos() -> list[str]:
-    """Return the exponents of chaotic motions, by the tangent map and by two orbits."""
+    """Return the exponents of chaotic solutions, by the tangent map and by two orbits."""
     head = "| model | | at | exponents | error | two orbits | error | apart, in errors |"
     lines = [head, "|---" * 8 + "|"]
     for model, kind, params, periods in CHAOS:
@@ -98,7 +98,7 @@ def vanishes(F: float, omega: float, side: float) -> float:
 
 
 def table_of_doublings() -> list[str]:
-    """Return where the exponents vanish, beside the doublings that are solved for."""
+    """Return where the exponents vanish, next to the doublings that are solved for."""
     lines = ["| F | PD (popp.md) | exponent vanishes, from above | apart |", "|---|---|---|---|"]
     for F, omega in DOUBLINGS:
         found = vanishes(F, omega, 1.0)

@@ -25,7 +25,7 @@ STUDIES = (
 )
 #: Studies of planes, each with the page that shows it.
 PLANES = {"popp-plane": "popp", "integrate-and-fire": "integrate-and-fire"}
-#: Digits behind the point: what is located to rounding, and confirmed in the tests.
+#: Digits after the point: what is located to rounding, and confirmed in the tests.
 DIGITS = 11
 
 

@@ -20,7 +20,7 @@ from contfric.study import Study, read_study
 
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parent / "images" / "gallery"
-#: Studies of each page: bundled ones by name, those beside this script by their files.
+#: Studies of each page: bundled ones by name, those next to this script by their files.
 PAGES: dict[str, tuple[str, ...]] = {
     "fig03": ("fig03",),
     "fig04": ("fig04",),
@@ -34,7 +34,7 @@ PAGES: dict[str, tuple[str, ...]] = {
 #: Studies that take minutes: motion is integrated there.
 LONG = ("fig17", "fig18")
 STUDIES = tuple(study for studies in PAGES.values() for study in studies)
-#: Digits behind the point in the tables: events are located to about 1e-10.
+#: Digits after the point in the tables: events are located to about 1e-10.
 DIGITS = 9
 #: Most turns of an itinerary in the table of windows: longer ones have windows of 1e-6 and less.
 LONGEST = 6
@@ -59,7 +59,7 @@ class Row:
 
 
 def study_of(name: str) -> Study:
-    """Return a study, bundled or beside this script."""
+    """Return a study, bundled or next to this script."""
     own = HERE / f"{name}.yaml"
     return read_study(own if own.is_file() else name)
 
@@ -71,7 +71,7 @@ def run(name: str, out: Path, *, figures: bool) -> cf.StudyResult:
 
 
 def rows_of(name: str, diagram: cf.Diagram) -> list[Row]:
-    """Return the events of a diagram, tangencies apart, beside what was published."""
+    """Return the events of a diagram, tangencies apart, next to what was published."""
     low, high = diagram.range
     rows = []
     for node in diagram.events:

@@ -59,7 +59,7 @@ def test_soft_end_of_the_universal_function() -> None:
 
 
 def test_rebound_of_bristles() -> None:
-    """Speed behind a stop with load S0, by integration of F and v, without and with damping."""
+    """Speed after a stop with load S0, by integration of F and v, without and with damping."""
     sigma0 = 1e6
     for m in (0.0, 0.7, 2.0):
         law = Law(0.2, 0.4, 1e9, sigma0, m * math.sqrt(sigma0))  # g stays S0

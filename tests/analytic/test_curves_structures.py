@@ -134,7 +134,7 @@ def test_curve_of_the_other_event_starts_at_the_point() -> None:
 
 
 def test_switching_ends_where_the_wall_grazes_the_flight() -> None:
-    """In closed form: up from x = -Ff/k with the speed behind the impact, and the wall is just touched."""
+    """In closed form: up from x = -Ff/k with the speed after the impact, and the wall is just touched."""
     found = point_of(curve("impact-friction", "SS", "1a, 5seg, 1imp", 5.57), "SS-GS")
 
     def conditions(u: Any) -> list[float]:

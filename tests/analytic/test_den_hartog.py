@@ -127,7 +127,7 @@ def test_amplitude_and_determinant() -> None:
 
 @pytest.mark.parametrize("distance", [1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5])
 def test_very_near_resonance(distance: float) -> None:
-    """At Omega = 1 friction below pi/4 does not bound the motion: X grows like 1 / |Omega - 1| and the
+    """At Omega = 1 friction below pi/4 does not bound the solution: X grows like 1 / |Omega - 1| and the
     half map nears the identity. Rounding grows with it, and no more than that."""
     exact = DenHartog(1 + distance, 0.4)
     assert float(exact.x_max) > 0.4 / abs(distance)

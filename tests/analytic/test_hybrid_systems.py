@@ -275,7 +275,7 @@ def test_a_pendulum_rotates_and_oscillates() -> None:
     closes(oscillates, fields(0.5))
     closes(turns, fields(1.5))
     assert oscillates.signature.resets == 0 < turns.signature.resets
-    for i, (_, exit_) in enumerate(turns.itinerary):  # behind a joint at pi it goes on at -pi
+    for i, (_, exit_) in enumerate(turns.itinerary):  # after a joint at pi it goes on at -pi
         if exit_ == "theta+":
             assert turns.ends[i, 1] == pytest.approx(math.pi, abs=1e-12)
             assert turns.begins[(i + 1) % len(turns.itinerary), 1] == pytest.approx(

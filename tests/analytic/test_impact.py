@@ -3,7 +3,7 @@
 Between impacts ``x = p(t) + free motion`` with the forced response p. An orbit of one impact a period T
 that meets the wall at phase s with speed u leaves it with ``-e u``; after T it is back::
 
-    (g - p(s), u - p'(s)) = M (g - p(s), -e u - p'(s)),      M the free motion over T,
+    (g - p(s), u - p'(s)) = M (g - p(s), -e u - p'(s)),      M the free solution over T,
 
 two linear equations for u and (with cos and sin of the phase) for s. The product of its multipliers is
 ``e^2 exp(-2 zeta T)``: the free motion contracts areas by the one factor, the impact with its saltation by

@@ -19,11 +19,11 @@ from dense_linear import SIZE, definition
 import contfric as cf
 
 EPS = 2.0**-52
-#: Units in the last place, times 1 + the fastest rate times the duration, that a motion may err.
+#: Units in the last place, times 1 + the fastest rate times the duration, that a solution may err.
 UNITS = 50
-#: States of a model of which most of a motion is kept from call to call.
+#: States of a model of which most of a solution is kept from call to call.
 WIDE = 8
-#: Places on the way at which the size of a motion is looked at.
+#: Places on the way at which the size of a solution is looked at.
 PARTS = 8
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
@@ -246,7 +246,7 @@ def moved(model: cf.Model, t0: float, y0: np.ndarray, dt: float, p: np.ndarray, 
 
 @pytest.mark.parametrize("name", [*CASES, *RANDOM])
 def test_what_is_kept_errs_no_more(wide, name):
-    """Many states: of a motion to 50 digits, whatever was asked before, and by forces and frequencies.
+    """Many states: of a solution to 50 digits, whatever was asked before, and by forces and frequencies.
 
     Responses to unit forces are kept where the frequency is not free, and are found for the forces else.
     """
@@ -283,7 +283,7 @@ def test_what_is_kept_errs_no_more(wide, name):
 
 
 def test_threads_share_what_is_kept(wide):
-    """Motions of one model in several threads are those of one thread, to the last bit."""
+    """Solutions of one model in several threads are those of one thread, to the last bit."""
     rng = np.random.default_rng(5)
     a, forces, y0 = rng.uniform(-1, 1, (WIDE, WIDE)), rng.uniform(-1, 1, (WIDE, 3)), np.ones(WIDE)
     p, durations = vector_of(wide, a, forces, 1.1), [0.2 + 0.013 * k for k in range(300)]

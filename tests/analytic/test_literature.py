@@ -1,6 +1,6 @@
 """Models of the literature: their diagrams by equations that share nothing with the library.
 
-Piecewise linear motions are in closed form (mpmath), the others are integrated by scipy; each
+Piecewise linear solutions are in closed form (mpmath), the others are integrated by scipy; each
 bifurcation is a root of its own condition.
 """
 
@@ -257,7 +257,7 @@ FF, B, E = 0.7961, 0.8471, 0.9
 
 
 def speed_squared(x: float, b: float) -> float:
-    """Return the square of the speed behind an impact at x, of a mass at rest."""
+    """Return the square of the speed after an impact at x, of a mass at rest."""
     return (1 + E) ** 2 * (1 - (x + b) ** 2)
 
 

@@ -1,4 +1,4 @@
-"""The LuGre oscillator: its motion against scipy's, its orbits against each other and simulation."""
+"""The LuGre oscillator: its solution against scipy's, its orbits against each other and simulation."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ TIP_JOINTS = (
     (7.835843029157, -1.320997426700, 0.066705858841, 3.41548991398e-4),
     (14.243869364818, 1.320998633584, -0.066718099958, -3.41543633732e-4),
 )
-#: The branch point there, 8e-8 beside a fold of the symmetric branch, and the doubling 4e-7 before it.
+#: The branch point there, 8e-8 next to a fold of the symmetric branch, and the doubling 4e-7 before it.
 TIP, DOUBLING = 0.490256250422, 0.490256687616
 
 
@@ -380,4 +380,4 @@ def test_a_doubled_orbit_ends_where_it_is_one_run_twice(model):
         there = [point.state(float(joint[0]) + half) - joint[1:] for joint in point.cycle]
         assert np.max(np.abs(there)) > 1e-6
     steps = np.linalg.norm(np.diff(branch.joints.reshape(len(branch), -1), axis=0), axis=1)
-    assert np.max(steps) < 1.0  # and the ends are rotated as the points beside them
+    assert np.max(steps) < 1.0  # and the ends are rotated as the points next to them

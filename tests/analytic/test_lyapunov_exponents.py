@@ -15,7 +15,7 @@ from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.two_orbits import two_orbit_estimate
 
 #: Stable orbits, with their names: sticks or none, symmetric or not, one period or two, with and without
-#: damping and third harmonic; and near a fold (0.5419), where the motion settles slowly.
+#: damping and third harmonic; and near a fold (0.5419), where the solution settles slowly.
 STABLE = {
     "1a": {"Omega": 0.5, "S": 0.32, "S0": 0.4},
     "1a near its fold": {"Omega": 0.5418, "S": 0.32, "S0": 0.4},
@@ -28,7 +28,7 @@ STABLE = {
     "2a": {"Omega": 0.4888, "S": 0.32, "S0": 0.4},
     "four sticks": {"Omega": 0.2, "S": 0.1, "S0": 0.4},
 }
-#: Chaotic motions in the domains of Figs. 8 to 11 of the reference, one with damping, one with h.
+#: Chaotic solutions in the domains of Figs. 8 to 11 of the reference, one with damping, one with h.
 CHAOTIC = (
     {"Omega": 0.35, "S": 0.05, "S0": 0.4},
     {"Omega": 0.3, "S": 0.1, "S0": 0.3},
@@ -117,7 +117,7 @@ def test_sum_rule_without_sticks(seed: int) -> None:
 @pytest.mark.parametrize("params", CHAOTIC, ids=case_name)
 @pytest.mark.parametrize("periods", [2, 6])
 def test_growth_is_that_of_neighbouring_motions(params: dict[str, float], periods: int) -> None:
-    """Central differences of the simulation over a few periods of a chaotic motion, joint for joint."""
+    """Central differences of the simulation over a few periods of a chaotic solution, joint for joint."""
     start, step = 1.0 + 0.9 * params["S0"], 1e-7
 
     def joint(x: float) -> tuple[float, np.ndarray]:

@@ -1,7 +1,7 @@
 """Exponents of integrated models: against multipliers of solved orbits, roots, other integrators, sums.
 
 Models with impacts (the tangent map goes through the reset), without excitation, of Filippov's kind, with a
-kink; and whatever a motion can do instead of having exponents.
+kink; and whatever a solution can do instead of having exponents.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ORBITS: dict[str, tuple[str, dict[str, float], list[float] | None, float]] = {
     "coulomb-yaml": ("coulomb-yaml", {}, None, 0.0),
     "lugre": ("lugre", {}, None, 0.0),
 }
-#: Chaotic motions, one of each kind: model, parameters, periods.
+#: Chaotic solutions, one of each kind: model, parameters, periods.
 CHAOTIC: dict[str, tuple[str, dict[str, float], int]] = {
     "popp": ("popp", {"omega": 1.69, "F": 0.1}, 600),  # below its grazing-sliding at 1.70780
     "impact": ("impact", {"w": 2.8, "d": 0.0}, 600),
@@ -120,7 +120,7 @@ def dop853_growth(
 
 @pytest.mark.parametrize("periods", [8, 20])
 def test_growth_over_impacts_is_that_of_another_integrator(periods: int) -> None:
-    """A chaotic motion from the same start, joint for joint: no statistics.
+    """A chaotic solution from the same start, joint for joint: no statistics.
 
     From a start without chatter, of which scipy misses impacts.
     """
@@ -157,7 +157,7 @@ def test_chaotic_exponent_agrees_with_two_orbits(name: str) -> None:
 
 
 def test_declared_coulomb_has_the_exponents_of_the_closed_form() -> None:
-    """A small map of periodic motions, and a chaotic motion within the errors."""
+    """A small map of periodic solutions, and a chaotic solution within the errors."""
     grid, fixed = {"Omega": [0.42, 0.5, 0.7], "S": [0.25, 0.32]}, {"S0": 0.4}
     closed, declared = (
         cf.lyapunov_map(name, grid, fixed, periods=200) for name in ("coulomb", "coulomb-yaml")
@@ -204,7 +204,7 @@ def test_autonomous_chaos_is_told_from_cycles() -> None:
     "params",
     [
         {"a": 1.0, "d": 3.0},  # a focus that attracts more slowly than its third direction
-        {"a": 3.0, "d": 4.0},  # a node beside a focus: surfaces are met no more
+        {"a": 3.0, "d": 4.0},  # a node next to a focus: surfaces are met no more
         {"a": 50.0, "d": 100.0, "k": 60.0},  # one direction is forgotten at once
         {"a": 1.0, "d": 3.0, "F": 0.5},
     ],

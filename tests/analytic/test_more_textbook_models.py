@@ -361,9 +361,9 @@ modes: {up: {in: {stop: +}}, down: {in: {stop: -}}}
 
 
 def test_chaos_of_a_converter_beyond_a_corner_collision() -> None:
-    """The unstable orbit of 4 periods meets the corner of the ramp; the attractor is chaotic behind it, too.
+    """The unstable orbit of 4 periods meets the corner of the ramp; the attractor is chaotic after it, too.
 
-    The exponents add up to the trace of the field, -1/(R C), whatever the motion does.
+    The exponents add up to the trace of the field, -1/(R C), whatever the solution does.
     """
     p = cf.load_model("buck").defaults
     with pytest.raises(cf.AperiodicError, match="chaotic"):
@@ -410,7 +410,7 @@ def test_the_next_mode_depends_on_the_one_before(tmp_path) -> None:
 def test_a_reset_at_a_corner_is_one_event_from_either_side(tmp_path, seed: int) -> None:
     """Where the upper level is met just as the time to wait is over: the clock starts anew, or goes on.
 
-    The motions of the two branches differ by that clock, and the event has that of the first one.
+    The solutions of the two branches differ by that clock, and the event has that of the first one.
     """
     draw = np.random.default_rng([19, seed])
     model = model_of(tmp_path, HEATER)

@@ -98,7 +98,7 @@ def vector(omega, S, h, zeta):
 def rounding(omega, h, zeta, t0, d):
     """The error that the arguments alone cost: half a unit in the last place of each phase, times the
     amplitude (1 + |h|) of the force and the growth of the response to it (d, at resonance), and of
-    the free motion (backwards in time, or with negative damping)."""
+    the free solution (backwards in time, or with negative damping)."""
     fastest = 3 * omega if h else omega
     rate = max(r.real for r in (np.roots([1, 2 * zeta, 1]) * d))
     growth = (1 + abs(d)) * math.exp(max(0.0, rate))

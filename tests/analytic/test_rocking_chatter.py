@@ -54,7 +54,7 @@ def flight(side, start, speed, a, W):
 
 
 def comes_back(theta, side, short):
-    """Return the first zero behind the start, looked for from a short time on; None if there is none in 2."""
+    """Return the first zero after the start, looked for from a short time on; None if there is none in 2."""
     tau = short
     while side * theta(tau) > 0:
         tau *= mpmath.mpf("1.2")
@@ -108,7 +108,7 @@ def test_the_block_comes_to_rest_on_both_sides_in_turn(block, a: float, r: float
         state = flow.state("chatter", float(begin[0]), begin[1:].copy(), lasts)
         assert (
             np.max(np.abs(state)) < 1e-14
-        ) == still  # between impacts before the limit, at rest behind it
+        ) == still  # between impacts before the limit, at rest after it
 
 
 def test_the_block_does_not_come_to_rest_where_it_is_thrown_before(block) -> None:

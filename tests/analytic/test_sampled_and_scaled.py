@@ -109,7 +109,7 @@ def test_the_clock_of_a_symmetric_relay_is_its_own_image(tmp_path: Path) -> None
     ]
     assert half.system.half and 2 * ticks[0] == ticks[1]
     assert half.as_whole().residual < 1e-10
-    with pytest.raises(cf.ModelError, match="none of the surfaces"):
+    with pytest.raises(cf.ModelError, match="not one of the surfaces"):
         typed(tmp_path, RELAY + "symmetry: x -> -x")
 
 

@@ -25,7 +25,7 @@ import orbits
 PARAMS = {
     "with sticks": {"Omega": 0.5, "S": 0.32, "S0": 0.4},
     "at resonance": {"Omega": 1.0, "S": 0.85, "S0": 0.9},
-    "beside the resonance of the third harmonic": {"Omega": 1 / 3, "S": 0.2, "S0": 0.3, "h": 0.2},
+    "next to the resonance of the third harmonic": {"Omega": 1 / 3, "S": 0.2, "S0": 0.3, "h": 0.2},
     "critically damped": {"Omega": 0.3, "S": 0.05, "S0": 0.3, "zeta": 1.0},
     "never at rest": {"Omega": 3.0, "S": 0.05, "S0": 0.05, "zeta": 0.1},
     "47 periods": {"Omega": 0.727557301185343, "S": 0.004061728723695903, "S0": 0.5916376916550578},

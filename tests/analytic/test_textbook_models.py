@@ -166,7 +166,7 @@ def froude(tmp_path_factory) -> cf.Diagram:
 
 
 def test_nothing_happens_to_a_motion_where_an_angle_begins_again(froude: cf.Diagram) -> None:
-    """The pendulum sticks to its shaft just where a turn is over: the name changes, the motion does not.
+    """The pendulum sticks to its shaft just where a turn is over: the name changes, the solution does not.
 
     The branches of both names end there, and go on as each other, whichever is met first.
     """

@@ -28,7 +28,7 @@ WORD_0S = (UP, DOWN)
 WORD_1A = (UP, DOWN, HELD_LOW)
 WORD_2S = (UP, HELD_HIGH, DOWN, HELD_LOW)
 
-#: Section 2: where each domain leads. At rest with |u| > S0 the motion reverses.
+#: Section 2: where each domain leads. At rest with |u| > S0 the solution reverses.
 PUBLISHED = {
     "x+v+": {"F+": "x0v+", "v": "x+v-"},
     "x0v+": {"F+": "x+v+", "F-": "x-v+", "v": "stick"},

@@ -139,7 +139,7 @@ def test_one_mode_on_both_sides_is_where_sliding_leads(tmp_path) -> None:
 
 
 def test_a_boost_converter_in_seconds_goes_on_where_its_current_dies(tmp_path) -> None:
-    """A segment of microseconds is long in a period of 50: its motion has not come to rest."""
+    """A segment of microseconds is long in a period of 50: its solution has not come to rest."""
     diagram = cf.explore(cf.find_orbit(typed(tmp_path, BOOST)), "R", (5.0, 60.0))
     assert not diagram.loose_ends
     assert len(diagram.branches) == 2

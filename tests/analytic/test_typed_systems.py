@@ -117,7 +117,7 @@ def test_modes_may_be_called_plus_and_minus(tmp_path) -> None:
 
 
 def test_a_spike_that_is_just_touched_jumps(tmp_path) -> None:
-    """Izhikevich's resonate-and-fire neuron begins at x = 0 behind a spike, at which y' = 0 means x = b.
+    """Izhikevich's resonate-and-fire neuron begins at x = 0 after a spike, at which y' = 0 means x = b.
 
     Below the threshold the neuron is linear: it touches y = 1 where A is 1 over the gain.
     """

@@ -143,7 +143,7 @@ def test_bad_study(study, tmp_path, capsys, monkeypatch, name, text, message) ->
         (["run"], "required: STUDY (see: contfric run --help)"),
         (["run", "fig05", "--ouf", "x"], "unrecognized arguments: --ouf"),
         (["graph", "--model", "colomb"], "unknown model 'colomb'; did you mean 'coulomb'"),
-        (["graph", "--out", "a.jpg"], "cannot draw to 'a.jpg': its ending is none of .png"),
+        (["graph", "--out", "a.jpg"], "cannot draw to 'a.jpg': its ending is not one of .png"),
         (["signatures", "show", "1s"], "unknown signature '1s'"),
         (["signatures", "shwo"], "invalid choice"),
         (["simulate", "-p", "Omega"], "-p takes NAME=VALUE, such as -p Omega=0.5; got 'Omega'"),

@@ -1,4 +1,4 @@
-"""Blocks of memory by their addresses: what is behind a handle, and kernels that are bound to one."""
+"""Blocks of memory by their addresses: what is after a handle, and kernels that are bound to one."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def test_given_starts_are_those_that_are_followed() -> None:
 
 
 def test_chaotic_transients_are_told_from_chaos() -> None:
-    """A motion that looks chaotic for hundreds of periods, from most of 50 starts, and never stays so."""
+    """A solution that looks chaotic for hundreds of periods, from most of 50 starts, and never stays so."""
     grid, fixed = {"Omega": [0.17142857], "S": [0.03025210]}, {"S0": 0.3}
     call: dict[str, Any] = {"periods": 60, "transient": 10, "starts": 50}
     short = cf.lyapunov_map("coulomb", grid, fixed, **call)

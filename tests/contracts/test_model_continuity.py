@@ -61,7 +61,7 @@ def test_jumps_are_refused(tmp_path, name) -> None:
 
 @pytest.mark.parametrize("force", ["0.01/(x - 0.2)", "v*x/(1 + x)"])
 def test_a_pole_in_a_state_is_warned_of(tmp_path, force: str) -> None:
-    """Prey and predators are positive: a pole where no motion comes is no fault."""
+    """Prey and predators are positive: a pole where no solution comes is no fault."""
     report = report_of(tmp_path, "pole", force)
     assert report.ok
     (found,) = {f.message for f in report.findings if f.topic.name == "CONTINUITY"} or [""]
@@ -95,7 +95,7 @@ resets: {{tick: {{s: '{map}'}}}}
 """
 
 
-#: The same motion in one mode, and in two with a surface between them at which nothing changes.
+#: The same solution in one mode, and in two with a surface between them at which nothing changes.
 ONE = "modes: {only: {field: {x: -x + s, s: 0}}}"
 TWO = """surfaces: {mid: {observable: x, level: ref}}
 field: {x: -x + s, s: 0}
@@ -117,4 +117,4 @@ def test_a_reset_that_jumps_is_refused(tmp_path, modes: str, map: str, jumps: bo
     (tmp_path / "model.yaml").write_text(SAMPLED.format(map=map, modes=modes), encoding="utf-8")
     report = cf.check_model(tmp_path / "model.yaml")
     assert report.ok != jumps
-    assert any("behind the reset at 'tick' jumps" in f.message for f in report.findings) == jumps
+    assert any("after the reset at 'tick' jumps" in f.message for f in report.findings) == jumps

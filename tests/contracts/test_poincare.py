@@ -170,7 +170,7 @@ def test_a_release_map_has_the_same_bits_wherever_its_tiles_are_computed(tmp_pat
 
 
 def test_what_comes_to_rest_never_again_is_not_waited_for() -> None:
-    """Some releases of this block lead to a motion that slides for ever, however long it is followed."""
+    """Some releases of this block lead to a solution that slides for ever, however long it is followed."""
     long, short = (cf.release_map("popp", count=24, periods=periods) for periods in (1e9, 50))
     assert np.any(np.isnan(long.images)) and np.any(np.isfinite(long.images))
     assert long.images.tobytes() == short.images.tobytes()

@@ -122,7 +122,7 @@ def test_gradients_say_where_they_are_one_sided(orbit: cf.Orbit) -> None:
 def test_equal_extrema_that_part_have_two_derivatives() -> None:
     """Of |x - a| at the mean a both sides are equal; a moves them apart, by +1 and -1."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.7, "S": 0.0, "S0": 0.0, "zeta": 0.1})
-    gradient = orbit.gradient("max(abs(x - h))")  # h is 0, and moves the level with the motion
+    gradient = orbit.gradient("max(abs(x - h))")  # h is 0, and moves the level with the solution
     assert gradient.one_sided
     assert "is reached at several times at once" in gradient.notes[0]
     assert gradient.ahead["h"] > gradient.behind["h"]

@@ -38,7 +38,7 @@ def test_samples_are_the_solution_of_the_equation_of_motion(time: float) -> None
     "name", ["belt", "bouncing-ball", "lugre", "coulomb", "rimless-wheel", "braced-chain"]
 )
 def test_every_model_meets_its_own_events_and_end(name: str) -> None:
-    """What is sampled at an event is the state there, behind its reset if it has one."""
+    """What is sampled at an event is the state there, after its reset if it has one."""
     model = cf.load_model(name)
     found = cf.simulate(model, periods=5)
     view = model.view(model.vector(found.params))

@@ -74,7 +74,7 @@ def test_branches_are_connected_up_to_mirror_images(name: str, result_of: Any) -
     found = result_of(name).diagram
     graph = nx.Graph(found.graph)
     for k, branch in enumerate(found.branches):
-        if branch.mirrored:  # an image stands behind its original
+        if branch.mirrored:  # an image stands after its original
             graph.add_edge(k - 1, k)
     # what only a seed leads to is a part of its own: 1a, 9seg of Fig. 4, with its bridges
     assert nx.number_connected_components(graph) == (2 if name == "fig04" else 1)

@@ -23,7 +23,7 @@ def computed(name: str, folder: Path) -> StudyResult:
 
 
 def shown_table(page: str, marker: str) -> list[list[str]]:
-    """Return the rows of the table behind a marker, without its head."""
+    """Return the rows of the table after a marker, without its head."""
     found = re.search(rf"<!-- {marker} -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
     assert found is not None
     return [[c.strip() for c in row.strip("|").split("|")] for row in found[1].splitlines()[2:]]

@@ -1,4 +1,4 @@
-"""Motions of two states as integrated flows, each for what it shows.
+"""Solutions of two states as integrated flows, each for what it shows.
 
 Mode 0 is Van der Pol's oscillator, ``x'' = mu (1 - x^2) x' - x``. Mode 1 is at rest, for observables
 that move by themselves. Observables: 0 is x, 1 is x', 2 is a trigonometric sum that moves with time alone::

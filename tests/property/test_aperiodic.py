@@ -1,4 +1,4 @@
-"""Motions that come to no orbit: how long they are followed, and what is said of them."""
+"""Solutions that come to no orbit: how long they are followed, and what is said of them."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_a_hidden_symmetry_gives_the_diagram_of_the_declared_one(start: float) -
         ({"c": 1.0}, 0.4, 3),
         ({"c": -0.5}, -0.3, 3),
     ],
-    ids=["transcritical", "beside a fold", "pitchfork", "subcritical"],
+    ids=["transcritical", "next to a fold", "pitchfork", "subcritical"],
 )
 def test_both_curves_through_a_branch_point_are_found_from_each(
     terms: dict[str, float], place: float, branches: int

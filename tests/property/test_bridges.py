@@ -38,7 +38,7 @@ CHOSEN: dict[str, Scene] = {
 }
 #: Ends of one event, in the parameter relative to the range, and in the motion.
 SAME_VALUE, SAME_MOTION = 1e-10, 1e-7
-#: A motion of the inclusion, by simulation from joint to joint.
+#: A solution of the inclusion, by simulation from joint to joint.
 MOTION = 1e-9
 #: Where a margin is smaller than this, rounding decides whether another event is met (nondimensional).
 UNDECIDED = 1e-9
@@ -99,7 +99,7 @@ def computed(found: cf.Diagram) -> Iterator[tuple[int, cf.Branch]]:
     return ((i, b) for i, b in enumerate(found.branches) if not b.mirrored)
 
 
-# ----------------------------------------------------------- a motion of the inclusion
+# ----------------------------------------------------------- a solution of the inclusion
 
 
 def domain_of(orbit: cf.Orbit, i: int) -> str:
@@ -118,7 +118,7 @@ def load(orbit: cf.Orbit, t: float, x: float) -> float:
 
 
 def motion_errors(orbit: cf.Orbit) -> Iterator[tuple[str, float]]:
-    """How far each segment is from a motion of the inclusion, (what, error)."""
+    """How far each segment is from a solution of the inclusion, (what, error)."""
     start = orbit.cycle.copy()
     assert np.max(np.abs(start[:, 2])) < MOTION  # every joint of this model is at rest
     start[:, 2] = 0.0
@@ -148,7 +148,9 @@ def simulated_error(orbit: cf.Orbit, i: int, begin: np.ndarray, end: np.ndarray)
         events=1_000_000 if touches else 1,
         domain=domain_of(orbit, i),
     )
-    if touches:  # whether a touch is met is a matter of rounding; where the motion is there is not
+    if (
+        touches
+    ):  # whether a touch is met is a matter of rounding; where the solution is there is not
         return float(np.max(np.abs(path.last[2] - [end[1], 0.0])))
     assert path.itinerary == (orbit.itinerary[i],), (orbit, i, path.itinerary)
     period = 2.0 * np.pi / orbit.params["Omega"]
@@ -207,7 +209,7 @@ def test_every_orbit_is_a_motion_of_the_inclusion(case: int | str) -> None:
 def gaps(found: cf.Diagram, index: int, side: int) -> Iterator[tuple[float, float]]:
     """Distances (parameter relative to the range, motion) to the other tips at the event of an end.
 
-    The motion and not the stops: at GS a touch of rest is a stop of the orbit with the hold only.
+    The solution and not the stops: at GS a touch of rest is a stop of the orbit with the hold only.
     """
     branch = found.branches[index]
     event = branch.ends[side].bifurcation
@@ -334,7 +336,7 @@ def test_the_chosen_ones_have_each_kind() -> None:
 
 
 def apart(one: cf.Orbit, other: cf.Orbit) -> float:
-    """Distance of two motions, up to whole periods and the mirror image."""
+    """Distance of two solutions, up to whole periods and the mirror image."""
     if other.periods > one.periods:
         one, other = other, one
     forcing = one.period / one.periods

@@ -1,4 +1,4 @@
-"""Chatter: infinitely many impacts and the contact behind them, as one segment.
+"""Chatter: infinitely many impacts and the contact after them, as one segment.
 
 Each number comes a second way: the impacts one after the other in 40 digits, and motions of two masses by
 exponentials of matrices, impact by impact, with the last ones left out.
@@ -46,7 +46,7 @@ def ball(folder: Path, reset: str = IMPACT) -> cf.Model:
 
 
 def impacts_of(a: float, e: float, t: float, v: float) -> list[tuple[mp.mpf, mp.mpf]]:
-    """Return (time, speed off the table) behind impacts from one on, in 40 digits, until these are slow."""
+    """Return (time, speed off the table) after impacts from one on, in 40 digits, until these are slow."""
     t, v, a, e = mp.mpf(t), mp.mpf(v), mp.mpf(a), mp.mpf(e)
     x, found = a * mp.sin(t), []
     while v - a * mp.cos(t) > mp.mpf(10) ** -16:
@@ -195,7 +195,7 @@ def test_a_branch_goes_to_where_the_chatter_is_not_complete_any_more() -> None:
 
 
 def _flown(a: float, e: float) -> float:
-    """Return when the impacts behind one release end; a time beyond the next release if they do not."""
+    """Return when the impacts after one release end; a time beyond the next release if they do not."""
     a_, t = mp.mpf(a), mp.asin(1 / mp.mpf(a))
     x, v = a_ * mp.sin(t), a_ * mp.cos(t)
 

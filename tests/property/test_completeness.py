@@ -45,7 +45,7 @@ CAUGHT = {
         "S0",
         (0.05235108330322144, 0.10748913795236487),
     ),
-    "a fold just behind a touch of rest was overshot, a branch of two periods arrived late": (
+    "a fold just after a touch of rest was overshot, a branch of two periods arrived late": (
         {
             "Omega": 0.12784125417014755,
             "S": 0.020945700324858936,
@@ -162,7 +162,7 @@ def test_what_leaves_where_no_first_point_is_found_at_the_event_itself() -> None
 
 
 def test_a_margin_that_vanishes_all_along_gives_no_accuracy() -> None:
-    """A load with equal maxima touches its limit twice: the event is where the slide behind it vanishes."""
+    """A load with equal maxima touches its limit twice: the event is where the slide after it vanishes."""
     params, vary, bounds = CAUGHT[EQUAL_MAXIMA]
     diagram = cf.explore(cf.find_orbit("coulomb", params), vary, bounds)
     (event,) = (b for b in diagram.of_kind("AS") if abs(b.params["h"] + 0.136152696511) < 1e-9)

@@ -24,19 +24,19 @@ from report import Tally
 
 #: Scenes by what was wrong with them.
 CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
-    "a vertex on a bridge, beside a fold of the simpler bridge": (
+    "a vertex on a bridge, next to a fold of the simpler bridge": (
         (1, 495),
         (1, 640),
         (1, 907),
         (1, 2105),
     ),
-    "a branch point beside a sliding event, nearer than parameters can tell": (
+    "a branch point next to a sliding event, nearer than parameters can tell": (
         (2, 101),
         (1, 2097),
         (1, 1268),
     ),
     "a hold that grows slowly": ((2, 58),),
-    "a branch point of a bridge beside its end": ((2, 169),),
+    "a branch point of a bridge next to its end": ((2, 169),),
     "a hold on a limit from which its load no longer falls": ((1, 2323), (1, 2146)),
     "two holds end at once, and Newton fails just before it": ((31, 25),),
     "a touch that splits into two of equal height": ((21, 3),),
@@ -128,7 +128,7 @@ def test_a_bridge_that_ends_at_a_symmetric_orbit(friction: float, limit: float) 
     """There its hold is as long as the stick of the other half, and another curve crosses.
 
     Tangents are rounding at that point. A fold was named where their slope jumps, and the search for what
-    turns there ended with an error: one half of the motion has a hold, the other none. The symmetric
+    turns there ended with an error: one half of the solution has a hold, the other none. The symmetric
     branch knows the event better than the bridge does: from where the bridge ends it began outside.
     """
     params = {"Omega": 0.5, "S": friction, "S0": limit, "h": 0.0, "zeta": 0.0}

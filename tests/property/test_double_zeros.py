@@ -13,7 +13,7 @@ import contfric as cf
 from contfric.atlas.verification import STEP
 from contfric.orbit.system import Margin
 
-#: Scenes with a bridge behind a touch of the limit inside of a stick: what varies, where, its parameters.
+#: Scenes with a bridge after a touch of the limit inside of a stick: what varies, where, its parameters.
 SCENES = [
     ("Omega", (0.17, 0.2), {"Omega": 0.1802, "S": 0.0146, "S0": 0.0384, "h": 0.2, "zeta": 0.01}),
     ("h", (0.3, 0.5), {"Omega": 0.0736, "S": 0.04554, "S0": 0.06393, "h": 0.367, "zeta": 5e-8}),

@@ -113,7 +113,7 @@ def test_boundary_equilibria_are_what_their_product_says(seed: int) -> None:
     at = event.equilibrium.state
     jump = a[1] @ at + b[1]  # f+ vanishes there
     product = -(inverse @ jump)[0]
-    if jump[0] < 0:  # sliding beside the event repels, and no mode rests there
+    if jump[0] < 0:  # sliding next to the event repels, and no mode rests there
         assert event.unfolding.name == "ALONE"
         return
     assert event.product == pytest.approx(product, rel=1e-6)

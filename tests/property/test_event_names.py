@@ -89,7 +89,7 @@ def test_a_contact_that_creeps_ends_at_the_limit_of_its_load(force: float) -> No
 
 
 def test_a_contact_that_sticks_for_good_does_not_end_a_diagram() -> None:
-    """Behind the event at which one of two contacts stops slipping the other one goes on, down to its limit.
+    """After the event at which one of two contacts stops slipping the other one goes on, down to its limit.
 
     All rests where the force on the first mass is at most the limit of that; the other contact then
     carries nothing. Where the second contact stops, its load just reaches the limit.

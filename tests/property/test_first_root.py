@@ -150,7 +150,7 @@ shares = st.floats(0.01, 1.0)
 
 
 def longest(omega):
-    """Long enough for many turns of both motions, short enough for the samples to see them all."""
+    """Long enough for many turns of both solutions, short enough for the samples to see them all."""
     return min(40.0, 6 * math.pi / omega + 10.0)
 
 

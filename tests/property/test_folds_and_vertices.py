@@ -58,7 +58,7 @@ def symmetric() -> cf.Branch:
 def test_a_load_that_stands_still_at_a_stop_is_told_by_its_bend(
     rate: float, outward: bool, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At its minimum it grows behind the stop, which is left; at its maximum it is held."""
+    """At its minimum it grows after the stop, which is left; at its maximum it is held."""
     (event,) = [b for b in asymmetric().bifurcations if b.tests and b.kind is not cf.Kind.T]
     (test, *_) = event.tests
     assert test.margin is Margin.JOINT and event.orbit.system.holds == ()
@@ -185,7 +185,7 @@ def test_a_start_behind_a_doubling_leaps() -> None:
     (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
     orbit = event.orbit.as_whole()
     settings = settings_of(orbit, "A", (62.0, 75.0), None, True, 5000)
-    # what is integrated rounds to 1e-13: beside the vertex Newton's method has to know that
+    # what is integrated rounds to 1e-13: next to the vertex Newton's method has to know that
     start = leave_branch_point(orbit, settings, "BP", LEAVE)
     assert start is not None and not overshoots(orbit, settings, start, LEAVE)
     side = trace_side(orbit, start.point, settings)
@@ -262,7 +262,7 @@ def test_one_event_has_one_name_where_nothing_jumps() -> None:
     assert telling_kind([cf.Kind.PD]) is cf.Kind.PD
     (jump,) = [b for b in asymmetric().bifurcations if b.tests and b.kind is not cf.Kind.T]
     other = replace(jump, kind=cf.Kind.GS)
-    assert same_kind(jump, jump) and same_kind(jump, other)  # the motion tells them apart
+    assert same_kind(jump, jump) and same_kind(jump, other)  # the solution tells them apart
     grazes = cf.continue_orbit(cf.find_orbit("belt", {"vb": 0.5}), "vb", (0.4, 0.7)).bifurcations
     (here,) = [b for b in grazes if b.kind is cf.Kind.SS]
     assert same_kind(here, replace(here, kind=cf.Kind.GS))

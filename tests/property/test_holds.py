@@ -29,7 +29,7 @@ from contfric.signature.edits import Edit, apply_edit, concatenate, drop, insert
 from contfric.signature.holds import TOUCH, departing_mode, hold_at, is_hold, without_holds
 
 COULOMB = load_model("coulomb")
-#: The three kinds: behind a stop on a surface (SS), a touch of rest (GS), a touch of the limit (AS).
+#: The three kinds: after a stop on a surface (SS), a touch of rest (GS), a touch of the limit (AS).
 WITH_HOLD = {
     "SS": "x-v+ -> x0v+ -> x+v+ -> hold@F+ -> x0v- -> x+v- -> x0v- -> stick",
     "GS": "x-v+ -> x0v+ -> hold@touch -> x0v+ -> x+v+ -> x+v- -> x0v- -> stick",
@@ -197,7 +197,7 @@ def test_what_the_graph_forbids_is_refused(itinerary, data) -> None:  # type: ig
 
 @cache
 def grazing() -> cf.Diagram:
-    """SS, AS and GS bridges; one of them ends where the slide behind its hold vanishes."""
+    """SS, AS and GS bridges; one of them ends where the slide after its hold vanishes."""
     params = {"Omega": 0.5, "S": 0.3, "S0": 0.4, "h": 0.28}
     return cf.explore(cf.find_orbit("coulomb", params), "h", (0.2385, 0.3))
 
@@ -220,7 +220,7 @@ def residuals(orbit: cf.Orbit, joints: np.ndarray, vector: np.ndarray) -> np.nda
 
 
 def short_slides() -> list[cf.Orbit]:
-    """Orbits of bridges in which a slide behind a hold is short, and its exit row is a mean rate."""
+    """Orbits of bridges in which a slide after a hold is short, and its exit row is a mean rate."""
     found = []
     for branch in bridges():
         for orbit in branch:

@@ -1,4 +1,4 @@
-"""The engine does not notice whether a motion is a closed form or integrated."""
+"""The engine does not notice whether a solution is a closed form or integrated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""At SS, AS and GS the flow jumps: the regular branch ends, and the motion goes elsewhere at once."""
+"""At SS, AS and GS the flow jumps: the regular branch ends, and the solution goes elsewhere at once."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def stable_end(found: cf.Diagram, kind: str) -> tuple[cf.Branch, int]:
 
 
 def beside(branch: cf.Branch, side: int, share: float) -> cf.Orbit:
-    """The orbit of the branch's itinerary beside an end: inside if positive, beyond it if negative.
+    """The orbit of the branch's itinerary next to an end: inside if positive, beyond it if negative.
 
     Beyond a stop that has become tangential (GS) the equations have no solution: the tip itself there.
     """
@@ -75,7 +75,7 @@ def beside(branch: cf.Branch, side: int, share: float) -> cf.Orbit:
 
 
 def leaves(orbit: cf.Orbit, periods: int = 400) -> float:
-    """How far from the stops of an orbit the motion gets that starts on it."""
+    """How far from the stops of an orbit the solution gets that starts on it."""
     start = orbit.cycle[0]
     path = cf.simulate(
         "coulomb",
@@ -91,7 +91,7 @@ def leaves(orbit: cf.Orbit, periods: int = 400) -> float:
 
 @pytest.mark.parametrize("kind", SCENES)
 def test_the_flow_jumps_beyond_the_event_and_not_before(kind: str) -> None:
-    """Before the event its orbit is followed for ever; however little beyond it, the motion leaves it."""
+    """Before the event its orbit is followed for ever; however little beyond it, the solution leaves it."""
     found = diagram(kind)
     branch, side = stable_end(found, kind)
     for share in (1e-4, 1e-6):

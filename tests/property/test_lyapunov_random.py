@@ -1,4 +1,4 @@
-"""Lyapunov exponents of motions that nobody has chosen: random parameters, every kind of motion."""
+"""Lyapunov exponents of solutions that nobody has chosen: random parameters, every kind of motion."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_mirror_image_has_the_same_exponents(seed: int) -> None:
 
 @pytest.mark.slow
 def test_errors_are_what_they_say() -> None:
-    """Averages over 600 periods of many chaotic motions, against those over 15000.
+    """Averages over 600 periods of many chaotic solutions, against those over 15000.
 
     In units of the errors the differences have a spread of one or, as the larger of two estimates is
     the error, a little less; 60 of them have it to a tenth.

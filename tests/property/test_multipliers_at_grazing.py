@@ -25,7 +25,7 @@ spread: {x: 2, v: 2}
 
 
 def random_mass_on_a_stop(seed: int, size: int) -> tuple[cf.Model, float]:
-    """Return masses of which the last meets a spring, and the amplitude of its motion without."""
+    """Return masses of which the last meets a spring, and the amplitude of its solution without."""
     draw = np.random.default_rng([seed, size])
     mass = np.diag(draw.uniform(0.5, 2.0, size))
     roots = draw.normal(size=(size, size))

@@ -1,4 +1,4 @@
-"""First hits and stationary points of observables that are not affine, along motions in closed form.
+"""First hits and stationary points of observables that are not affine, along solutions in closed form.
 
 The motion is long against the changes of the observable: sin(k x) of a state that drifts. Reference: the
 closed form sampled densely, each change of sign refined by Brent's method.

@@ -39,7 +39,7 @@ each_diagram = pytest.mark.parametrize("name", DIAGRAMS)
 @cache
 def branches(name: str) -> tuple[cf.Branch, ...]:
     params, parameter, bounds = DIAGRAMS[name]
-    # bridges are no motions, and lead to orbits with multipliers of a thousand: see test_bridges
+    # bridges are no solutions, and lead to orbits with multipliers of a thousand: see test_bridges
     diagram = cf.explore(cf.find_orbit("coulomb", params), parameter, bounds, bridges=False)
     assert diagram.complete and diagram.branches
     return diagram.branches
@@ -127,7 +127,7 @@ def test_signature_is_the_one_that_the_simulation_visits(name: str) -> None:
     differ, count = [], 0
     for orbit in orbits(name, every=9):
         if np.min(orbit.margins) < 1e-3:
-            continue  # beside an event a domain is as short as one likes
+            continue  # next to an event a domain is as short as one likes
         _, time = section(orbit)
         state = orbit.state(time)
         seen = domains_passed(turn(orbit, time, state), state, time)

@@ -49,7 +49,7 @@ CAUGHT: dict[str, Case] = {
         "w",
         (1.6509324712260434, 3.3492994690408917),
     ),
-    "at a graze an orbit of two periods did not show that its motion repeats itself": (
+    "at a graze an orbit of two periods did not show that its solution repeats itself": (
         "impact",
         {
             "A": 0.18773144545737439,

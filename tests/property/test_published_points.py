@@ -64,7 +64,7 @@ CHOSEN: dict[str, Scene] = {
 ON_CIRCLE = 1e-6
 #: Stored and recomputed ones, also of mirror images; a release without a rate makes them infinite.
 SAME, INFINITE = 1e-6, 1e6
-#: Multipliers change with the root of the distance beside a tangential stop: how much over one point.
+#: Multipliers change with the root of the distance next to a tangential stop: how much over one point.
 NEAR = 0.05
 #: Distances (in Omega) from which a vertex is looked for.
 DISTANCES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3)

@@ -47,7 +47,7 @@ CAUGHT = {
         "S",
         (0.4485401097208499, 0.6334203602706272),
     ),
-    "SS behind which the margin returns": (
+    "SS after which the margin returns": (
         {"Omega": 0.48686413344649343, "S": 0.4550178672135545, "S0": 0.6298070384581034},
         "h",
         (-0.11070223568189062, 0.11070223568189062),
@@ -102,7 +102,7 @@ def test_every_point_is_a_solved_admissible_orbit(case: int | str) -> None:
                 continue  # a fold or a branch point: at fixed parameters the problem is singular
             solved = refine(orbit, damped=False)
             # nothing is left to correct but rounding, divided by the distance from the singular
-            # case and, beside an event, from the tangential one: where both are small Newton's method
+            # case and, next to an event, from the tangential one: where both are small Newton's method
             # cannot see that it has converged
             margin = min(1.0, float(np.min(np.abs(orbit.margins))))
             assert solved.converged or min(1.0, away) * margin < 1e-7, orbit
@@ -121,7 +121,7 @@ def test_every_end_has_its_reason(case: int | str) -> None:
             if end.reason.name in {"CS", "SS", "AS", "GS"} and end.bifurcation is not None:
                 assert end.bifurcation.kind.value == end.reason.name
                 assert any(end.bifurcation.params == b.params for b in branch.bifurcations)
-    # where the motion is continuous something follows
+    # where the solution is continuous something follows
     for loose in found.loose_ends:
         assert loose.end.reason.name in {"SS", "AS", "GS"}, loose
 

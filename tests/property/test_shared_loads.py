@@ -256,7 +256,7 @@ def test_with_springs_jenkins_elements_and_a_normal_force_of_time() -> None:
 
 
 def test_braces_with_static_above_kinetic_friction_have_the_same_events_from_every_branch() -> None:
-    """Where one brace stops as the other lets go, the stick behind it has another limit."""
+    """Where one brace stops as the other lets go, the stick after it has another limit."""
     chained = np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
     braces = {
         name: {"kind": "friction", "velocity": velocity, "kinetic": 0.05, "static": 0.06}

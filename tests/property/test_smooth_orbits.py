@@ -68,7 +68,7 @@ def test_a_wall_gives_one_diagram_from_every_branch(seed: int) -> None:
     size = amplitude(params)
     low, high = 0.95 * size, 1.05 * size
     answer = 1.0 / (1.0 - params["omega"] ** 2 + 2j * params["zeta"] * params["omega"])
-    state = (answer.real, -params["omega"] * answer.imag)  # other motions hit the wall
+    state = (answer.real, -params["omega"] * answer.imag)  # other solutions hit the wall
     free = cf.find_orbit(MODELS / "one_wall.yaml", {**params, "gap": 1.02 * size}, state=state)
     assert free.signature.segments == ("free-", "free")
     found = cf.explore(free, "gap", (low, high), max_periods=2)
@@ -164,7 +164,7 @@ def test_a_model_without_surfaces_in_which_nothing_moves_is_refused(tmp_path: Pa
 
 
 def test_an_orbit_around_a_centre_is_one_of_a_family(tmp_path: Path) -> None:
-    """Of ``x'' = -c x`` every motion is an orbit, of period ``2 pi / c^(1/2)`` and with a multiplier 1."""
+    """Of ``x'' = -c x`` every solution is an orbit, of period ``2 pi / c^(1/2)`` and with a multiplier 1."""
     text = "name: a\nstates: [x, v]\nparameters: {c: 4}\nautonomous: true\nfield: {x: v, v: -c*x}\n"
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
     found = cf.find_orbit(cf.load_model(tmp_path / "a.yaml"), {}, state=[0.7, 0.0])

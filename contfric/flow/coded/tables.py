@@ -26,7 +26,7 @@ _TABLES = (
     *("observable_of", "seen_at", "group_of"),
 )
 _NUMBERS = ("values", "states", "waves", "parameters", "coefficients", "period_at")
-#: What is behind a handle of a model whose formulas are data.
+#: What is after a handle of a model whose formulas are data.
 LAYOUT = {
     **dict.fromkeys(_TABLES, TABLE),
     **dict.fromkeys(("numbers", "weights", "returns"), WEIGHTS),

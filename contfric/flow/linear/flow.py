@@ -10,7 +10,7 @@ hardly amplified; a long duration is cut into steps of that kind, of the same le
 
     by y0: E = exp(A d),  by t0: z' = A z + b'(t),  by p: z' = A z + A_p y + b_p(t),  by d: y'(t0 + d).
 
-Of many states most of a motion is kept from call to call (:mod:`contfric.flow.linear.kept`).
+Of many states most of a solution is kept from call to call (:mod:`contfric.flow.linear.kept`).
 """
 
 from __future__ import annotations

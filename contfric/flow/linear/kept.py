@@ -1,4 +1,4 @@
-"""Exponentials that are kept: a motion in two parts, of which the longer one is known from before.
+"""Exponentials that are kept: a solution in two parts, of which the longer one is known from before.
 
 Along a branch, and from step to step of Newton's method, durations d change little, and a matrix A without
 the free parameter does not change. So d is taken apart: ``d = k h + r``, with h a power of two that is a
@@ -42,13 +42,13 @@ from contfric.flow.linear.system import TERMS, FloatArray, growth, start_waves, 
 
 #: Numbers that a model's memory has, 32 MB: it is taken from the system as it is used.
 NUMBERS = 2**22
-#: Most motions that are kept, and most matrices.
+#: Most solutions that are kept, and most matrices.
 _SLOTS, _LADDERS = 64, 32
 #: Attempts to take the memory, about 50 microseconds: what is kept takes longer to find anew.
 _PATIENCE = 3000
 #: h is at most this over the rate, and at least half of it.
 _SHARE = 0.125
-#: Most steps of a motion whose responses to unit forces are kept.
+#: Most steps of a solution whose responses to unit forces are kept.
 _LONGEST = 1024
 #: Where things are in the memory: the lock, the lengths of a slot and of the powers of a matrix, those that
 #: are overwritten next, matrices so far; then the number of the piece (from 1), and k, of each slot; the
@@ -199,7 +199,7 @@ def ladder_of(motion, piece, h, rate, spread, grown, memory, system):  # type: i
 
 @helper
 def find(memory, piece, k, stamp, spare, slots):  # type: ignore[no-untyped-def]
-    """Return where the slot of a motion is, and whether it is of this matrix.
+    """Return where the slot of a solution is, and whether it is of this matrix.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def find(memory, piece, k, stamp, spare, slots):  # type: ignore[no-untyped-def]
     for j in range(slots):
         if memory[_KEYS + 2 * j] == piece + 1 and memory[_KEYS + 2 * j + 1] == k:
             at = _BEGIN + j * length
-            # where it is of another matrix no other slot has this motion
+            # where it is of another matrix no other slot has this solution
             return at, memory[at + OF] == stamp
     j = int(memory[_NEXT])
     if _BEGIN + j * length == spare:
@@ -221,7 +221,7 @@ def find(memory, piece, k, stamp, spare, slots):  # type: ignore[no-untyped-def]
 
 @helper
 def kept_slot(piece, k, ladder, spare, spare_matrix, memory, system):  # type: ignore[no-untyped-def]
-    """Return where a motion is kept, whose exponential is found where it has to be."""
+    """Return where a solution is kept, whose exponential is found where it has to be."""
     n, waves = system.work.shape[1], system.w.shape[0]
     slots, _ = places_in(memory, n, system.co.shape[0], waves)
     at, known = find(memory, piece, k, ladder.head[STAMP], spare, slots)

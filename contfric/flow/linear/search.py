@@ -93,7 +93,7 @@ def sixth_of(poly, first, terms):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def leaving(poly, terms, h):  # type: ignore[no-untyped-def]
-    """Return the power with which a motion leaves the level that it starts on; beyond the terms: never."""
+    """Return the power with which a solution leaves the level that it starts on; beyond the terms: never."""
     q1, q2, q3 = poly[1] / h, 2.0 * poly[2] / (h * h), 6.0 * poly[3] / (h * h * h)
     if abs(q1) > AT_START * (1.0 + abs(q2)):
         return 1
@@ -138,7 +138,7 @@ def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyp
     Returns
     -------
     tuple
-        (the root, -1 if there is none, no number if the search is too long; a place behind it up to which
+        (the root, -1 if there is none, no number if the search is too long; a place after it up to which
         there is no other one).
     """
     sixth, rounding = bound[0], _ROUNDING * bound[1]
@@ -193,7 +193,7 @@ def state_at(series, terms, s, out):  # type: ignore[no-untyped-def]
 
 @inlined_helper
 def begin_search(motion, piece, c, t0, y0, dt, p, none, memory, system, sight):  # type: ignore[no-untyped-def]
-    """Evaluate the system and the observable; return the rate (no number: no motion) and the spread.
+    """Evaluate the system and the observable; return the rate (no number: no solution) and the spread.
 
     And the rate of the matrix alone.
     """

@@ -36,7 +36,7 @@ from contfric.flow.linear.ladder import FIRST, ROWS, STAMP, add_product, ladder_
 from contfric.flow.linear.responses import add_pair, double, pairs_in, write_pairs
 from contfric.flow.linear.system import REACH, TERMS, FloatArray, start_waves, terms_for
 
-#: A motion that is no longer than this, in steps, takes one step: the search allows a little more.
+#: A solution that is no longer than this, in steps, takes one step: the search allows a little more.
 _ONE_STEP = 1.04
 #: Rows with waves, against the number of frequencies, up to which responses to unit forces are kept.
 _FEW = 4

@@ -60,7 +60,7 @@ class System(NamedTuple):
     work : workspace for n numbers, and the derivative by the time of the start, (6, n)
     series, other : Taylor terms of the state, and of another column, (TERMS + 1, n)
     varied : derivatives by the parameters, (parameters, n)
-    maps : exp(A d) of a motion, and of a step, (2 n, n); (0, n) where no derivatives are wanted
+    maps : exp(A d) of a solution, and of a step, (2 n, n); (0, n) where no derivatives are wanted
     scratch : space for the coefficients of a unit force, (entries,)
     """
 

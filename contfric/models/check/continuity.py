@@ -138,7 +138,7 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
             state = probe.model.states[found[0]]
             report.error(
                 Topic.CONTINUITY,
-                f"'{state}' behind the reset at '{reset.surface}' jumps by {found[2]:.3g} between states "
+                f"'{state}' after the reset at '{reset.surface}' jumps by {found[2]:.3g} between states "
                 f"that meet it in mode '{domain.own_mode}': a branch would end where an orbit comes there. "
                 "A reset has to be continuous within a mode; only modes may jump",
             )
@@ -153,7 +153,7 @@ def _behind(
     b: tuple[float, FloatArray],
     share: float,
 ) -> FloatArray | None:
-    """Return the state behind a reset from between two states; None where that is in another domain."""
+    """Return the state after a reset from between two states; None where that is in another domain."""
     t, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
     sides = _real_sides(probe, reset, probe.signs(t, y))
     towards = domain.signs[reset.surface] * probe.rate(domain.own_mode, reset.surface, t, y) < 0.0

@@ -95,7 +95,7 @@ class Probe:
         return self.flow.jacobian(mode, t, y, 0.0)[:, 1 + n].copy()
 
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
-        """Return the state behind the reset at a surface."""
+        """Return the state after the reset at a surface."""
         return self.flow.reset(surface, t, y)
 
     def states(self, count: int) -> Iterator[tuple[float, FloatArray]]:

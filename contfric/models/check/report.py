@@ -58,8 +58,8 @@ class ModelReport(Shown):
     model : name of the model
     counts : how many single comparisons were made for each topic; 0 where a topic does not apply
     findings : what is wrong, errors and warnings, and what is of use to know, notes
-    closed : modes whose motion is a closed form, of a model that is declared by its equations
-    integrated : modes whose motion is integrated, each with the reason
+    closed : modes whose solution is a closed form, of a model that is declared by its equations
+    integrated : modes whose solution is integrated, each with the reason
 
     Examples
     --------

@@ -233,7 +233,7 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     model, name = probe.model, reset.surface
     behind = probe.reset(name, t, y)
     signs = probe.signs(t, behind)
-    where = f"behind the reset at '{name}' the motion from {_place(probe, t, y)}"
+    where = f"after the reset at '{name}' the solution from {_place(probe, t, y)}"
     possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
     fits = [
         d
