@@ -72,7 +72,9 @@ def test_the_place_of_an_event_does_not_depend_on_the_step() -> None:
     compared = 0
     for scene, (vary, bounds, _) in enumerate(SCENES):
         for branch in _bridges(scene)[:6]:
-            middle = branch[len(branch) // 2]
+            # by the parameter: points may crowd at an end that is known to its accuracy only
+            halfway = 0.5 * (branch.values[0] + branch.values[-1])
+            middle = branch[int(np.argmin(np.abs(branch.values - halfway)))]
             step = 0.01 * STEP
             again = cf.continue_orbit(middle, vary, bounds, max_step=step, stability=False)
             found = [e.bifurcation for e in again.ends if e.bifurcation and e.reason.name == "AS"]
