@@ -8,7 +8,7 @@ misses, from twice the degree on, are rounding.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from contfric.quantities.panels import (
     SERIES,
     WEIGHTS,
 )
+from contfric.quantities.tape import Tape
 
 #: The last eight coefficients of a Legendre series, from the values at the nodes.
 _LAST = np.ascontiguousarray(SERIES[-8:])
@@ -59,6 +60,28 @@ class Chain(NamedTuple):
     which: IntArray
 
 
+class Course(NamedTuple):
+    """What is integrated over which segment.
+
+    Attributes
+    ----------
+    functions, p : the flow and its parameters
+    tape, extra : the expressions, and the parameter that follows those of the model
+    chained : whether the solution to a node starts at the node before
+    mode, start, begin, lasts : of the segment: its mode, the time and state at its start, its duration
+    """
+
+    functions: Any
+    p: FloatArray
+    tape: Tape
+    extra: float
+    chained: bool
+    mode: int
+    start: float
+    begin: FloatArray
+    lasts: float
+
+
 class IntegralWorkspace(NamedTuple):
     """Workspace of integrals; allocated once. C is 1, and where derivatives are wanted 4 + n + parameters.
 
@@ -73,6 +96,7 @@ class IntegralWorkspace(NamedTuple):
     row : integral over a segment and its gradient, shape (L, C)
     least : sizes below which values are rounding, shape (L,)
     waiting : parts of a segment that are to be resolved
+    begin : state at the start of a segment
     """
 
     equations: EquationWorkspace
@@ -87,6 +111,7 @@ class IntegralWorkspace(NamedTuple):
     row: FloatArray
     least: FloatArray
     waiting: FloatArray
+    begin: FloatArray
 
 
 @allocating_helper
@@ -122,15 +147,17 @@ def integral_workspace(tape, whole, m, parameters, which, none, exact, columns):
         np.empty((outputs, columns)),
         np.zeros(outputs),
         np.empty((DEEPEST + 2, SIZES + outputs)),
+        np.empty(n),
     )
 
 
 @helper
-def reach_node(functions, mode, start, begin, after, chained, p, chain, before):  # type: ignore[no-untyped-def]
+def reach_node(course, after, chain, before):  # type: ignore[no-untyped-def]
     """Move to a time after the start of a segment: from there, or from the last node."""
-    n, since, jac, step = begin.shape[0], chain.after[0], chain.jac, chain.step
+    functions, mode, start, begin = course.functions, course.mode, course.start, course.begin
+    n, since, jac, step, p = begin.shape[0], chain.after[0], chain.jac, chain.step, course.p
     chain.after[0] = after
-    if not chained or since < 0.0 or after < since:
+    if not course.chained or since < 0.0 or after < since:
         functions.flow(mode, start, begin, after, p, chain.which, chain.state, jac)
         return
     for i in range(n):
@@ -167,19 +194,17 @@ def write_gradient(gradient, jac, which, share, out):  # type: ignore[no-untyped
 
 
 @helper
-def sample_part(  # type: ignore[no-untyped-def]
-    functions, tape, mode, start, begin, lasts, low, high, chained, p, extra, own, chain, data
-):
+def sample_part(course, low, high, own, chain, data):  # type: ignore[no-untyped-def]
     """Write outputs and their gradients at the nodes of a part; False if a noted argument changes sign."""
-    signs, between = own.signs, own.equations.between
+    signs, tape, n = own.signs, course.tape, course.begin.shape[0]
     for q in range(signs.shape[0]):
         signs[q, 0], signs[q, 1] = np.inf, -np.inf
     for k in range(NODES):
         share = low + 0.5 * (high - low) * (POINTS[k] + 1.0)
-        time = start + share * lasts
-        reach_node(functions, mode, start, begin, share * lasts, chained, p, chain, between)
+        after = share * course.lasts
+        reach_node(course, after, chain, own.equations.between)
         evaluate_tape(
-            functions, tape, time, chain.state, p, chain.which, extra, own.values, chain.grads
+            course, course.start + after, chain.state, chain.which, own.values, chain.grads
         )
         for q in range(signs.shape[0]):
             value = own.values[tape.noted[q]]
@@ -188,7 +213,6 @@ def sample_part(  # type: ignore[no-untyped-def]
             output = tape.outputs[j]
             data[j, k, 0] = own.values[output]
             if data.shape[2] > 1:
-                n = begin.shape[0]
                 differentiate_tape(
                     tape, output, n, chain.which, own.values, chain.grads, own.weights, own.gradient
                 )

@@ -33,6 +33,7 @@ from contfric.orbit.integral_parts import (
     LIGHT,
     LOW,
     SIZES,
+    Course,
     add_part,
     integral_workspace,
     resolved,
@@ -51,9 +52,7 @@ TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
 
 
 @helper
-def over_segment(  # type: ignore[no-untyped-def]
-    functions, tape, mode, start, begin, lasts, level, chained, p, extra, own
-):
+def over_segment(course, level, own):  # type: ignore[no-untyped-def]
     """Write the integral over a segment, and its gradient; False if it is left to others.
 
     The values alone, which cost a fraction of the derivatives, say first which parts there are.
@@ -69,66 +68,32 @@ def over_segment(  # type: ignore[no-untyped-def]
     while count > 0:
         count -= 1
         low, high, depth = waiting[count, LOW], waiting[count, HIGH], waiting[count, DEPTH]
-        if not sample_part(
-            functions,
-            tape,
-            mode,
-            start,
-            begin,
-            lasts,
-            low,
-            high,
-            chained,
-            p,
-            extra,
-            own,
-            own.light,
-            light,
-        ):
+        if not sample_part(course, low, high, own, own.light, light):
             return False
         left, fine = resolved(light, waiting[count], LIGHT, level)
         with_slopes = np.inf
         if fine and data.shape[2] == 1:
-            add_part(light, low, high, lasts, row)
+            add_part(light, low, high, course.lasts, row)
             continue
         if fine:
-            sample_part(
-                functions,
-                tape,
-                mode,
-                start,
-                begin,
-                lasts,
-                low,
-                high,
-                chained,
-                p,
-                extra,
-                own,
-                own.exact,
-                data,
-            )
+            sample_part(course, low, high, own, own.exact, data)
             with_slopes, fine = resolved(data, waiting[count], EXACT, level)
             if fine:
-                add_part(data, low, high, lasts, row)
+                add_part(data, low, high, course.lasts, row)
                 continue
         if depth >= DEEPEST or not left < np.inf:
             return False
         middle = 0.5 * (low + high)
-        waiting[count + 1, LOW], waiting[count + 1, HIGH] = low, middle
-        waiting[count, LOW] = middle
         for j in range(data.shape[0]):
             waiting[count + 1, SIZES + j] = waiting[count, SIZES + j]
-        for k in range(count, count + 2):
-            waiting[k, DEPTH], waiting[k, LIGHT], waiting[k, EXACT] = (
-                depth + 1,
-                left,
-                with_slopes,
-            )
+        for k in range(2):
+            part = waiting[count + k]
+            part[LOW], part[HIGH] = (middle, high) if k == 0 else (low, middle)
+            part[DEPTH], part[LIGHT], part[EXACT] = depth + 1, left, with_slopes
         count += 2
     if data.shape[2] > 1:  # the mean times how the duration moves
         for j in range(data.shape[0]):
-            row[j, 2 + begin.shape[0]] += row[j, 0] / lasts
+            row[j, 2 + course.begin.shape[0]] += row[j, 0] / course.lasts
     return True
 
 
@@ -176,6 +141,30 @@ def add_to_joints(layout, whole, i, row, reset, on_joints, on_parameters, d_peri
     on_parameters[free] += row[3 + n + free]
 
 
+@helper
+def enter_segment(functions, whole, i, z, turn, joint, p, own):  # type: ignore[no-untyped-def]
+    """Write the state at the start of segment i, after a reset in which it begins; return its duration."""
+    count, n, reset = z.shape[0], z.shape[1] - 1, whole.resets[i] >= 0
+    base = i % count
+    end = z[base + 1, 0] if base + 1 < count else 0.0 if turn == 0.0 else z[0, 0] + turn
+    if reset:
+        apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
+    for j in range(n):
+        own.begin[j] = own.equations.behind[n, j] if reset else joint[1 + j]
+    return end - z[base, 0]
+
+
+@helper
+def least_sizes(course, own):  # type: ignore[no-untyped-def]
+    """Let the sizes below which values are rounding grow to those of a segment."""
+    own.light.after[0] = -1.0
+    sample_part(course, 0.0, 1.0, own, own.light, own.values_only)
+    for j in range(own.least.shape[0]):
+        for k in range(NODES):
+            size = abs(own.values_only[j, k, 0]) * (ROUNDING / RESOLVED)
+            own.least[j] = max(own.least[j], size)
+
+
 @kernel(
     types.boolean(
         *(FlowType, LayoutType, ExtremeType, TapeType, matrix, vector, indices, f8, f8, i8),
@@ -185,7 +174,7 @@ def add_to_joints(layout, whole, i, row, reset, on_joints, on_parameters, d_peri
 def integrate(  # type: ignore[no-untyped-def]
     functions,
     layout,
-    whole_orbit,
+    extreme,
     tape,
     z,
     p,
@@ -195,100 +184,52 @@ def integrate(  # type: ignore[no-untyped-def]
     chained,
     out,
     on_joints,
-    on_parameters,
+    by_parameters,
 ):
     """Write the integrals of L expressions over an orbit, and their gradients; False if it is left to others.
 
     Parameters
     ----------
-    whole_orbit : an extremum, of which the layout of the whole orbit is used
+    extreme : an extremum, of which the layout of the whole orbit is used
     which : the parameters that move, none where no gradients are wanted
     extra : the parameter that follows those of the model
     level : share of the last coefficients at which a part is resolved
     chained : 1 where the solution to a node starts at the node before
     out : shape (L,)
     on_joints : by the joints, shape (L, N, m), or (0, N, m) where no gradients are wanted
-    on_parameters : by the parameters that move and the extra one, shape (L, len(which) + 1)
+    by_parameters : by the parameters that move and the extra one, shape (L, len(which) + 1)
     """
-    count, m = z.shape
-    n, free, exact, whole = m - 1, which.shape[0], on_joints.shape[0] > 0, whole_orbit.whole
-    length, outputs = whole.modes.shape[0], out.shape[0]
-    columns = 4 + n + free if exact else 1
-    d_period, none = np.zeros(free), np.empty(0, dtype=np.int64)
+    m, free, exact, whole = z.shape[1], which.shape[0], on_joints.shape[0] > 0, extreme.whole
+    length, columns = whole.modes.shape[0], 3 + m + free if exact else 1
+    d_period, none, turn = np.zeros(free), np.empty(0, dtype=np.int64), 0.0
     own = integral_workspace(tape, length, m, p.shape[0], which, none, exact, columns)
-    orbit = extreme_workspace(length, m, min(count, 0))
-    fill_cycle(functions, layout, whole_orbit, z, p, orbit)
-    turn = 0.0
+    orbit = extreme_workspace(length, m, min(length, 0))
+    fill_cycle(functions, layout, extreme, z, p, orbit)
     if layout.turn != 0.0:
         turn = layout.turn * functions.period(p, none, own.equations.empty)
         functions.period(p, own.exact.which, d_period)
-    begins, lasts = np.empty((length, n)), np.empty(length)
-    for i in range(length):
-        joint, base = orbit.cycle[i], i % count
-        end = z[base + 1, 0] if base + 1 < count else 0.0 if turn == 0.0 else z[0, 0] + turn
-        lasts[i] = end - z[base, 0]
-        begins[i] = joint[1:]
-        if whole.resets[i] >= 0:
-            apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
-            begins[i] = own.equations.behind[n, :n]
-        own.light.after[0] = -1.0
-        if not lasts[i] > 0.0:
-            continue
-        sample_part(
-            functions,
-            tape,
-            whole.modes[i],
-            joint[0],
-            begins[i],
-            lasts[i],
-            0.0,
-            1.0,
-            chained == 1,
-            p,
-            extra,
-            own,
-            own.light,
-            own.values_only,
-        )
-        for j in range(outputs):
-            for k in range(NODES):
-                size = abs(own.values_only[j, k, 0]) * (ROUNDING / RESOLVED)
-                own.least[j] = max(own.least[j], size)
     out[:] = 0.0
     on_joints[:, :, :] = 0.0
-    on_parameters[:, :] = 0.0
-    for i in range(length):
-        joint = orbit.cycle[i]
-        if not lasts[i] > 0.0:
+    by_parameters[:, :] = 0.0
+    for k in range(2 * length):  # sizes of all segments are known before the first one is resolved
+        i, joint = k % length, orbit.cycle[k % length]
+        lasts = enter_segment(functions, whole, i, z, turn, joint, p, own)
+        course = Course(
+            functions, p, tape, extra, chained == 1, whole.modes[i], joint[0], own.begin, lasts
+        )
+        if not lasts > 0.0:
             continue
-        if not over_segment(
-            functions,
-            tape,
-            whole.modes[i],
-            joint[0],
-            begins[i],
-            lasts[i],
-            level,
-            chained == 1,
-            p,
-            extra,
-            own,
-        ):
+        if k < length:
+            least_sizes(course, own)
+            continue
+        if not over_segment(course, level, own):
             return False
-        if whole.resets[i] >= 0 and exact:
-            apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
-        for j in range(outputs):
+        after = own.equations.behind
+        for j in range(out.shape[0]):
             out[j] += own.row[j, 0]
             if exact:
                 add_to_joints(
-                    layout,
-                    whole,
-                    i,
-                    own.row[j],
-                    own.equations.behind,
-                    on_joints[j],
-                    on_parameters[j],
-                    d_period,
+                    layout, whole, i, own.row[j], after, on_joints[j], by_parameters[j], d_period
                 )
     return True
 

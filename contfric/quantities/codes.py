@@ -8,4 +8,3 @@ CONSTANT, TIME, STATE, PARAMETER, OBSERVABLE = range(5)
 NEGATE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, WHERE = range(5, 12)
 #: Functions of one argument, in the order of :data:`contfric.models.grammar.UNARY`.
 FIRST_FUNCTION = 12
-SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN = range(12, 26)

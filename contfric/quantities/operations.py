@@ -5,122 +5,50 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import helper
+from contfric.flow.coded.operations import SIN, function_of, slope_of
 from contfric.quantities.codes import (
-    ABS,
-    ACOS,
     ADD,
-    ASIN,
-    ATAN,
     CONSTANT,
-    COS,
-    COSH,
     DIVIDE,
-    EXP,
-    LOG,
+    FIRST_FUNCTION,
     MULTIPLY,
     NEGATE,
     OBSERVABLE,
     PARAMETER,
     POWER,
-    SIN,
-    SINH,
-    SQRT,
     STATE,
     SUBTRACT,
-    TAN,
-    TANH,
     TIME,
     WHERE,
 )
 
-
-@helper
-def function_of(operation, x):  # type: ignore[no-untyped-def]
-    """Return a function of one argument."""
-    if operation == SIN:
-        return math.sin(x)
-    if operation == COS:
-        return math.cos(x)
-    if operation == TAN:
-        return math.tan(x)
-    if operation == ASIN:
-        return math.asin(x) if abs(x) <= 1.0 else math.nan
-    if operation == ACOS:
-        return math.acos(x) if abs(x) <= 1.0 else math.nan
-    if operation == ATAN:
-        return math.atan(x)
-    if operation == SINH:
-        return math.sinh(x)
-    if operation == COSH:
-        return math.cosh(x)
-    if operation == TANH:
-        return math.tanh(x)
-    if operation == EXP:
-        return math.exp(x)
-    if operation == LOG:
-        return math.log(x) if x > 0.0 else math.nan
-    if operation == SQRT:
-        return math.sqrt(x) if x >= 0.0 else math.nan
-    if operation == ABS:
-        return abs(x)
-    return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
+#: From the code of a function here to that in the formulas of flows, which have the same order.
+_TO_FLOW = SIN - FIRST_FUNCTION
 
 
 @helper
-def slope_of(operation, x, value):  # type: ignore[no-untyped-def]
-    """Return the derivative of a function of one argument; ``value`` is the function."""
-    if operation == SIN:
-        return math.cos(x)
-    if operation == COS:
-        return -math.sin(x)
-    if operation == TAN:
-        return 1.0 + value * value
-    if operation == ASIN:
-        return 1.0 / math.sqrt(1.0 - x * x)
-    if operation == ACOS:
-        return -1.0 / math.sqrt(1.0 - x * x)
-    if operation == ATAN:
-        return 1.0 / (1.0 + x * x)
-    if operation == SINH:
-        return math.cosh(x)
-    if operation == COSH:
-        return math.sinh(x)
-    if operation == TANH:
-        return 1.0 - value * value
-    if operation == EXP:
-        return value
-    if operation == LOG:
-        return 1.0 / x
-    if operation == SQRT:
-        return 0.5 / value
-    if operation == ABS:
-        return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
-    return 0.0
-
-
-@helper
-def evaluate_tape(functions, tape, t, y, p, which, extra, values, grads):  # type: ignore[no-untyped-def]
+def evaluate_tape(course, t, y, which, values, grads):  # type: ignore[no-untyped-def]
     """Write the values of all operations at one node.
 
     Parameters
     ----------
-    extra : the parameter that follows those of the model
+    course : flow, tape and parameters (:class:`contfric.orbit.integral_parts.Course`)
     values : shape (K,)
     grads : gradients of observables, shape (K, 1 + n + len(which)), not filled if (K, 0)
     """
-    operations = tape.operations
+    operations, p = course.tape.operations, course.p
     for k in range(operations.shape[0]):
         operation, a, b = operations[k, 0], operations[k, 1], operations[k, 2]
         if operation == CONSTANT:
-            values[k] = tape.constants[a]
+            values[k] = course.tape.constants[a]
         elif operation == TIME:
             values[k] = t
         elif operation == STATE:
             values[k] = y[a]
         elif operation == PARAMETER:
-            values[k] = p[a] if a < p.shape[0] else extra
+            values[k] = p[a] if a < p.shape[0] else course.extra
         elif operation == OBSERVABLE:
-            values[k] = functions.observe(a, t, y, p, which, grads[k])
+            values[k] = course.functions.observe(a, t, y, p, which, grads[k])
         elif operation == NEGATE:
             values[k] = -values[a]
         elif operation == ADD:
@@ -136,7 +64,7 @@ def evaluate_tape(functions, tape, t, y, p, which, extra, values, grads):  # typ
         elif operation == WHERE:
             values[k] = values[b] if values[a] > 0.0 else values[operations[k, 3]]
         else:
-            values[k] = function_of(operation, values[a])
+            values[k] = function_of(operation + _TO_FLOW, values[a])
 
 
 @helper
@@ -166,7 +94,7 @@ def spread_back(operations, k, weight, values, weights):  # type: ignore[no-unty
     elif operation == WHERE:
         weights[b if values[a] > 0.0 else operations[k, 3]] += weight
     else:
-        weights[a] += weight * slope_of(operation, values[a], values[k])
+        weights[a] += weight * slope_of(operation + _TO_FLOW, values[a], values[k])
 
 
 @helper
