@@ -1,4 +1,4 @@
-"""What it costs that a solution is integrated: next to the closed form, and beside scipy's integrators.
+"""What it costs that a solution is integrated: next to the closed form, and next to scipy's integrators.
 
 ``python benchmarks/integrated.py`` writes ``docs/benchmarks-integrated.md`` and its figure. Times are the
 least processor times of many calls: they are those of the code, not of what else runs on the machine.
@@ -303,7 +303,7 @@ A LuGre slide from rest over 2.2 units of time, with derivatives by t0, the thre
 ## One period of the LuGre oscillator
 
 Omega = 0.5, S0 = 0.4, sigma0 = 1000, vS = 0.05, with derivatives by the states (contfric: by t0 and the
-duration, too), stops found on the way; in turns, beside heyoka (Taylor series compiled by LLVM) where it is
+duration, too), stops found on the way; in turns, next to heyoka (Taylor series compiled by LLVM) where it is
 installed. Times are to be compared at one error: those in the bristles fade, so that a tolerance says little.
 
 {period}

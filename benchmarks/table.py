@@ -21,9 +21,9 @@ ROUNDS = 15
 FURTHER = (
     "Further: [cost at scale](benchmarks-scale.md) (segments, a million points, each monitor on and off),",
     "[cost of a scene](benchmarks-scenes.md) (what it does and skips, cold and warm),",
-    "[run time against error](benchmarks-error.md) (beside other packages),",
+    "[run time against error](benchmarks-error.md) (next to other packages),",
     "[AUTO-07p](benchmarks-auto.md) (a branch, paired),",
-    "[number of states](benchmarks-states.md) (a chain with a contact, beside scipy and heyoka),",
+    "[number of states](benchmarks-states.md) (a chain with a contact, next to scipy and heyoka),",
     "[curves in two parameters](curves.md#cost), [Lyapunov maps](lyapunov.md#run-time-accuracy-memory),",
     "[numerical integration](benchmarks-integrated.md).",
 )

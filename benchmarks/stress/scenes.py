@@ -73,7 +73,7 @@ def _special(kind: str, p: Params, rng: np.random.Generator) -> Params:
         return {"Omega": (1.0 + beside) / 3.0, "h": rng.uniform(-0.3, 0.3)}
     if kind == "damped":
         return {"zeta": 10.0 ** rng.uniform(-2, 1)}
-    if kind == "weak":  # damping, or nothing would settle
+    if kind == "weak":  # damping, or nothing would converge
         S = 10.0 ** rng.uniform(-12, -2)
         return {"S": S, "S0": S + rng.choice([0.0, 1e-9, 1e-3, 0.3]), "zeta": 0.03}
     if kind == "equal":

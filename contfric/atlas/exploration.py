@@ -139,7 +139,7 @@ class Exploration:
             return
 
     def known(self, orbit: Orbit) -> int | None:
-        """Return the branch, of those already traced, that an orbit lies on; None if there is none."""
+        """Return the branch, of those already traced, that an orbit lies on, or None."""
         return next((i for i, b in enumerate(self.branches) if on_branch(orbit, b)), None)
 
     def ends_here(self, orbit: Orbit, event: Event) -> int | None:

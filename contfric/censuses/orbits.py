@@ -10,7 +10,7 @@ from contfric.atlas.matching import stops_distance
 from contfric.censuses.itineraries import canonical_pair
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import settle
+from contfric.orbit.solve import refine_with_symmetry
 from contfric.signature import ReducedItinerary
 
 #: Orbits of one itinerary whose stops agree to this are one: rounding over a multiplier's distance from 1
@@ -51,8 +51,8 @@ class Catalogue:
             if walk in self.continua:
                 return
             self.continua.add(walk)
-        settled = orbit if orbit.system.half else settle(orbit)
-        found.append(settled if settled.converged and settled.admissible else orbit)
+        refined = orbit if orbit.system.half else refine_with_symmetry(orbit)
+        found.append(refined if refined.converged and refined.admissible else orbit)
 
     def sorted(self) -> tuple[Orbit, ...]:
         """Return the orbits by periods, stops, name and largest displacement."""

@@ -15,7 +15,7 @@ from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.solve import settle
+from contfric.orbit.solve import refine_with_symmetry
 from contfric.orbit.system import build_system
 
 _BITS = 100
@@ -195,8 +195,8 @@ class _Search:
         system = build_system(self.model, last.itinerary, 1)
         joints = np.array([[t, x, 0.0] for t, x in last.joints])
         near = Orbit(system, joints, self.vector, np.inf)
-        settled = settle(near)
-        orbit = settled if settled.converged else near
+        refined = refine_with_symmetry(near)
+        orbit = refined if refined.converged else near
         phases = [self._folded(self.zeros[k].phase) for k in own]
         multiplier = arb(last.slope)
         return ProvedOrbit(orbit, tuple(phases), multiplier, symmetric, not symmetric)

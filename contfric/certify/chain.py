@@ -38,7 +38,7 @@ class Segments:
     modes : mode of each segment
     exits : surface that each segment ends on; empty for a hold
     pins : condition at the start of each hold: a surface, or (mode, surface) whose rate vanishes; else None
-    resets : surface of the reset that each segment begins behind; empty if there is none
+    resets : surface of the reset that each segment begins behind; empty without one
     closure : state matrix of the closure, whole numbers or floats
     turn : duration of a turn in periods of the excitation; 0 without excitation
     """
@@ -90,7 +90,7 @@ class Move:
     ----------
     field : the matrix M of the mode, (D, D)
     start, by_time : the start w, and its derivative by time, (D, 1)
-    reset : matrix of the reset before it; None if there is none
+    reset : matrix of the reset before it; None without one
     flow : exp(M d), (D, D)
     end, speed : exp(M d) w, and M times it, (D, 1)
     """

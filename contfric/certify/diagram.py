@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -79,8 +79,12 @@ def certify_diagram(
         ended = f"the time limit of {time_limit:g} s ended the run"
     if late and ended:
         ended += f": {_parts(late, len(nodes))} not done"
+    written = {k: checkable(_parts_of(found.get(k))) for k in tasks}
     events = [
-        _event_summary(node.bifurcation, tuple(i + 1 for i in node.branches), found.get(k))
+        replace(
+            _event_summary(node.bifurcation, tuple(i + 1 for i in node.branches), found.get(k)),
+            checkable=bool(written[k]),
+        )
         for k, node in enumerate(nodes)
     ]
     tubes = [
@@ -96,7 +100,7 @@ def certify_diagram(
         time.time() - began,
         ended,
         (
-            *checkable([part for k in tasks for part in _parts_of(found.get(k))]),
+            *(part for parts in written.values() for part in parts),
             *(tube for k in tasks for tube in _tubes(found.get(k), until)),
         ),
     )

@@ -85,6 +85,7 @@ class EventSummary:
     ball : decimals that contain the parameter, such as ``0.25 +/- 1e-40``; empty if none are known
     radius : of the ball; None if it is not known
     why : what is not proved; empty if all is
+    checkable : whether the file has a certificate of it, which ``contfric verify`` checks
     """
 
     label: str
@@ -94,6 +95,7 @@ class EventSummary:
     ball: str
     radius: float | None
     why: str
+    checkable: bool = True
 
     @property
     def proved(self) -> bool:
@@ -166,6 +168,11 @@ class DiagramCertificate(Shown):
         other = [f"branch {b.number} ({b.name}), {text}" for b in self.branches for text in b.open]
         return (*events, *lines, *other)
 
+    @property
+    def unchecked(self) -> tuple[str, ...]:
+        """Labels of the events that are proved and that ``contfric verify`` does not check."""
+        return tuple(e.label for e in self.events if e.proved and not e.checkable)
+
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
 
@@ -214,6 +221,10 @@ class DiagramCertificate(Shown):
         lines += [f"  undecided: {text}" for text in left[:_SHOWN]]
         if len(left) > _SHOWN:
             lines.append(f"  and {len(left) - _SHOWN} more")
+        if self.unchecked:
+            lines.append(
+                f"  proved, and not in the file for a checker: {', '.join(self.unchecked)}"
+            )
         return "\n".join(lines)
 
 

@@ -230,7 +230,7 @@ class Follower:
             raise UndecidedError(f"{stretch.mode}, {surface}: {finding.why}")
 
     def _guess(self, stretch: Stretch) -> tuple[str, float] | None:
-        """Return the exit of the solution in the middle, and about when it is; None if there is none."""
+        """Return the exit of the solution in the middle, and about when it is, or None."""
         start = np.array([float(c.mid()) for c in stretch.state.at.entries()])
         states = self._tables[stretch.mode] @ start
         step = float(self.balls.period.mid()) / _STEPS

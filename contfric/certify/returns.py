@@ -40,7 +40,7 @@ class Release:
     mode, surface : of the rest, and where it ends
     rests : the surface that is rested on
     following, on : index of the mode that follows, surfaces that it starts on as bits
-    image : the surface of the image of the release under the symmetry; empty if there is none
+    image : the surface of the image of the release under the symmetry; empty without one
     """
 
     mode: str

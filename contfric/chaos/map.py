@@ -110,7 +110,7 @@ class LyapunovMap(Tabled):
 
     @cached_property
     def values(self) -> FloatArray:
-        """Largest exponent over all starts, shape (len, len); nan where there is none."""
+        """Largest exponent over all starts, shape (len, len); nan without one."""
         return self._of_largest(self.exponents[..., 0])
 
     @cached_property

@@ -89,7 +89,7 @@ class KernelFiles(_Cache):  # type: ignore[misc]
         return None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the code, None if there is none."""
+        """Return the code, or None."""
         # what is loaded needs numba's runtime, and none of the tables that its compiler fills by ``refresh``:
         # that is a quarter of a second
         rtsys.initialize(target_context)

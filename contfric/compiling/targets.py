@@ -60,7 +60,7 @@ _SAME_MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 def baseline() -> Baseline | None:
-    """Return the baseline of this kind of machine, None if there is none."""
+    """Return the baseline of this kind of machine, or None."""
     machine = platform.machine().lower()
     return BASELINES.get(_SAME_MACHINE.get(machine, machine))
 

@@ -277,9 +277,7 @@ def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings
     off = abs(off_circle(kind, orbit))
     largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))
     if kind is not Kind.SN and _EPS * largest > _HIDDEN:  # a fold is seen by its parameter
-        return (
-            f"{_none_of(bifurcation)} beside multipliers of {largest:.2g} rounding decides its test"
-        )
+        return f"{_none_of(bifurcation)} next to multipliers of {largest:.2g} rounding decides its test"
     changes = 0.0
     if before.mu.size and np.all(np.isfinite([before.mu, after.mu])):
         s = critical(kind, orbit)

@@ -100,7 +100,7 @@ class Crossing:
 
 
 def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing | None:
-    """Return the branch point within a distance of an orbit (scaled product); None if there is none."""
+    """Return the branch point within a distance of an orbit (scaled product), or None."""
     system = orbit.system
     active = orbit.model.index_of(settings.parameter)
     problem = _Problem(system, orbit.vector, active, settings.width)
@@ -167,7 +167,7 @@ class _Problem:
 
 
 def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return unknowns and left null vector at the branch point near a point; None if there is none."""
+    """Return unknowns and left null vector at the branch point near a point, or None."""
     residual, jacobian = problem.at(x)
     if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
         return None

@@ -110,7 +110,7 @@ class _Search:
 
         Parameters
         ----------
-        slopes : of the point before the step, both ends, and the point after it; nan where there is none
+        slopes : of the point before the step, both ends, and the point after it; nan without one
         """
         for share in _nearest(slopes):
             middle = point_between(self._start(), step.before, step.after, self.settings, share)

@@ -231,7 +231,7 @@ def anchor(workspace, z, p, which, tz, tw, scale):  # type: ignore[no-untyped-de
 
 @helper
 def take_tangent(work, tz, tw, scale):  # type: ignore[no-untyped-def]
-    """Replace a tangent by the unit one of the last elimination; False if there is none."""
+    """Replace a tangent by the unit one of the last elimination; tell whether it has one."""
     count, m = tz.shape
     total = 0.0
     for i in range(count):

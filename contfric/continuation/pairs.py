@@ -79,7 +79,7 @@ def end_dip(way, points, k, values, i, surface, is_exit, length):  # type: ignor
 
     Parameters
     ----------
-    values : at the last point but one (NaN if there is none), at the last one and at the new one
+    values : at the last point but one (NaN without one), at the last one and at the new one
     """
     f0, f1, f2 = values
     near = min(abs(f1), abs(f2))

@@ -158,7 +158,7 @@ class _Release:
         return float(next(row[2] for row in rows if row[0] == 0 and row[1] == pin and row[3] == 0))
 
     def jumps(self, grid: FloatArray) -> FloatArray:
-        """Return the release to a stop on the surface at each parameter; nan if there is none."""
+        """Return the release to a stop on the surface at each parameter, or nan."""
         found, time = np.empty(len(grid)), float(self.letters["a"].joints[0, 0])
         step = _STEP * self.period
         for k, value in enumerate(grid):

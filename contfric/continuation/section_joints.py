@@ -43,7 +43,7 @@ def is_on_section(bifurcation: Bifurcation) -> bool:
 
 
 def move_joints(orbit: Orbit, side: Side, settings: Settings) -> bool:
-    """Go on from the last point with joints on faster crossings of the section; False if there are none."""
+    """Go on from the last point on joints at faster crossings of the section; tell whether it has any."""
     system, tip = orbit.system, side.tip
     at = [
         k

@@ -93,7 +93,7 @@ def smooth_events(
 
 
 def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
-    """Return the last point at which the signs of multipliers are told; None if there is none.
+    """Return the last point at which the signs of multipliers are told, or None.
 
     Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event
     it is infinite, or its sign is that of a rate that is rounding.

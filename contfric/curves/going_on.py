@@ -242,7 +242,7 @@ def _is_exit(problem: Problem, pinned: IntArray) -> bool:
 
 
 def _step_away(problem: Problem, start: Point, border: FloatArray, step: float) -> Point | None:
-    """Return the point a step away from the first one; None if there is none."""
+    """Return the point a step away from the first one, or None."""
     rows = Rows.empty(problem.system, 2, 2)
     rows.put(0, start)
     _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step)

@@ -38,7 +38,7 @@ class EnsembleEvent:
     label : str
         Kind, and names of the branches that meet; of several alike in a diagram the second is ``... (2)``.
     values : ndarray, shape (samples,)
-        Its place in each sample, nan where there is none.
+        Its place in each sample; nan without one.
     count : int
         Samples that have it.
     share, low, high : float

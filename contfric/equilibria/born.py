@@ -83,12 +83,12 @@ def _amplitude(event: HopfPoint) -> float:
 
 def _solved(event: HopfPoint, amplitude: float) -> Orbit | None:
     """Return the cycle of an amplitude; None if Newton's method comes to none of that size."""
-    from contfric.orbit.solve import settle
+    from contfric.orbit.solve import refine_with_symmetry
 
     guess = _ellipse(event, amplitude)
     if guess is None:
         return None
-    found = settle(guess)
+    found = refine_with_symmetry(guess)
     if not (found.converged and found.admissible):
         return None
     centre = event.equilibrium.state

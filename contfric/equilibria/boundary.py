@@ -48,7 +48,7 @@ class Partner:
     Attributes
     ----------
     unfolding : what happens
-    region, place : the other mode and the point of its curve, directed into its region; None if there is none
+    region, place : the other mode and the point of its curve, directed into its region; None without one
     product : the number whose sign decides; nan where the surface has no field on its other side
     """
 

@@ -168,7 +168,7 @@ class BoundaryPoint(EquilibriumEvent):
     unfolding : Unfolding
         Persistence, non-smooth fold, or alone.
     partner : str
-        Mode of the equilibrium that meets it; empty if there is none.
+        Mode of the equilibrium that meets it; empty without one.
     product : float
         The number whose sign tells persistence (positive) from a non-smooth fold; nan where it has no
         meaning.

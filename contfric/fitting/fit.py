@@ -311,7 +311,7 @@ class _Problem:
 
 
 def _result(future: Future[Answer | None] | None) -> Answer | None:
-    """Return what a worker has found; None if there is none, or it was lost with its worker."""
+    """Return what a worker has found; None if that is nothing, or was lost with its worker."""
     try:
         return None if future is None else future.result()
     except Exception:  # executors of others raise errors of their own

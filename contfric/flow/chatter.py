@@ -133,7 +133,7 @@ def is_left(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
-    """Advance (t, y) from after an impact to after the next; return the time between, -1 if there is none.
+    """Advance (t, y) from after an impact to after the next; return the time between, or -1.
 
     ``slopes`` (1 + n, 1 + n + k), the derivatives of (t, y), are advanced as well, if there are any.
     """
@@ -183,7 +183,7 @@ def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
 
 
 @allocating_helper
-def settle(motion, mode, limit, p):  # type: ignore[no-untyped-def]
+def refine_limit(motion, mode, limit, p):  # type: ignore[no-untyped-def]
     """Take what is left of the gap's rate out of a limit, along the change that an impact makes."""
     flight, c, y = motion.flights[mode], motion.gaps[mode], limit[1:]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
@@ -251,7 +251,7 @@ def write_limit(nodes, count, limit, jac):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-untyped-def]
-    """Write the limit (t*, y*) of the impacts from after one of them; return its error, -1 if there is none.
+    """Write the limit (t*, y*) of the impacts from after one of them; return its error, or -1.
 
     ``jac`` (1 + n, 1 + n + k), if it has space: its derivatives by t0, y0 and the parameters.
     """
@@ -306,5 +306,5 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     if not found:
         return -1.0
     write_limit(nodes, count, limit, jac)
-    settle(motion, mode, limit, p)
+    refine_limit(motion, mode, limit, p)
     return last

@@ -61,7 +61,7 @@ def refine_hit(motion, mode, c, target, sign, t, h, low, high, at, p, workspace)
 
 @helper
 def first_in_step(motion, mode, c, target, sign, multiple, t, a, h, left, right, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the first root in the last step as time after its start; -1 if there is none.
+    """Return the first root in the last step as time after its start, or -1.
 
     ``left`` and ``right`` are the nodes (q, q', q'') at ``a`` and at the end; the observable starts on
     the side ``sign``, or on a root of order ``multiple``. No number if the search does not come to an

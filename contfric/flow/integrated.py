@@ -11,7 +11,7 @@ differentiated by; whatever has no space (an array of length 0) is not filled.
 2. ``observe(c, t, y, p, which, grad)``: return observable c; its derivatives to ``grad`` (1 + n + m,).
 3. ``rate(mode, c, t, y, p, which, grad)``: return the rate of observable c along a mode; the same
    gradient.
-4. ``period(p, which, grad)``: return the period of the excitation, 0 if there is none; ``grad`` (m,).
+4. ``period(p, which, grad)``: return the period of the excitation, or 0; ``grad`` (m,).
    The field and the observables must have this period.
 5. ``scale(i, p)`` (``scale_signature``): return the natural size of state i, the unit of its absolute
    tolerance. A state that is multiplied by a stiffness of 1000 in the field has the scale 1/1000.

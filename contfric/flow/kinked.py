@@ -67,7 +67,7 @@ def piece_at(motion, mode, t, y, on, p, workspace):  # type: ignore[no-untyped-d
 
 @helper
 def first_crossing(motion, piece, t, h, on, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the first crossing of a kink in the last step and which one it is; (-1, -1) if there is none.
+    """Return the first crossing of a kink in the last step and which one it is, or (-1, -1).
 
     ``on`` is the kink that the step starts on, -1 if none. No number if the search does not come to an end.
     """

@@ -90,7 +90,7 @@ def chatter_parts(
 
 
 def with_chatter(model: Model) -> Model | None:
-    """Return a model with chatter at all of its walls for which that is derived; None if there is none."""
+    """Return a model with chatter at all of its walls for which that is derived, or None."""
     from contfric.models.derive import model_from
     from contfric.models.describe import describe, from_text
 

@@ -112,7 +112,7 @@ def write_block(
     ----------
     derivatives : the array for them: they are not wanted if it is empty
     columns : assignments ``target[...] = 0`` for one parameter that nothing depends on
-    result : name of the value to return, None if there is none
+    result : name of the value to return, or None
     """
     prefix = "c"
     temporaries, reduced = sympy.cse(

@@ -77,7 +77,7 @@ class Rest:
         return found
 
     def states(self, given: str) -> str | None:
-        """Return the states of the contacts, a letter for each; None if there are none.
+        """Return the states of the contacts, a letter for each, or None.
 
         Parameters
         ----------

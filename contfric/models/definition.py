@@ -82,7 +82,7 @@ class Model(Shown, TransitionMaps):
     surfaces : tuple of Surface
         Those of one observable from the highest level down.
     stop_surface : str
-        Surface (or kink) on which the displacement is stationary: stops lie on it; empty if there is none.
+        Surface (or kink) on which the displacement is stationary: stops lie on it; empty without one.
     flow_factory : callable
         Returns the :class:`~contfric.flow.interface.CompiledFlow`; called at first use only.
     spread : callable
@@ -115,7 +115,7 @@ class Model(Shown, TransitionMaps):
         are at joints, as they are with a joint wherever the mass stops.
     phase : str
         The surface of the excitation's phase that divides modes in which an orbit may stay: a joint of orbits
-        that meet no other surface, and no label (:mod:`contfric.models.phases`); empty if there is none.
+        that meet no other surface, and no label (:mod:`contfric.models.phases`); empty without one.
     quantities : tuple of (str, str)
         Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
     ball_factory : callable or None

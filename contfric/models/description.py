@@ -57,7 +57,7 @@ class Description:
     leads : surface -> modes after the reset, the first that holds, where they are said
     acts : surface -> modes in which the reset acts, where they are said
     chatters : modes that begin with infinitely many impacts
-    symmetry : name (a state or t) -> expression of its image; None if there is none
+    symmetry : name (a state or t) -> expression of its image; None without one
     stop_surface : empty if it is to be found
     kinks : observables at whose zeros the fields have kinks, and are continuous
     angles : states that are the same a turn later
@@ -67,7 +67,7 @@ class Description:
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
     units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
-    phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty if there is none
+    phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty without one
     structure : what modes are made from when they are visited; empty where all are listed
     """
 

@@ -95,7 +95,7 @@ class Evaluator(Generic[T]):
         return [self.value(rate, params, t, y) for rate in rates]
 
     def period(self, params: Mapping[str, T]) -> T | None:
-        """Return the period of the excitation, None if there is none."""
+        """Return the period of the excitation, or None."""
         text = self.description.period
         return self.value(text, params) if text else None
 

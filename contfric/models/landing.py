@@ -142,7 +142,7 @@ class Landing:
         t: float,
         y: Sequence[float],
     ) -> int:
-        """Return the side of a surface to which one image leaves; 0 if there is none, or two."""
+        """Return the side of a surface to which one image leaves; 0 without one, or with two."""
         away = set()
         for domain in behind:
             sides = {s: domain.signs[s] for s in met if domain.signs[s]}

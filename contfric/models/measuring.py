@@ -41,7 +41,7 @@ def measured(description: Description) -> Description:
 
 
 def displacement_of(description: Description) -> str:
-    """Return the name of the observable that is the displacement; empty if there is none."""
+    """Return the name of the observable that is the displacement, or an empty text."""
     x = description.states[0]
     return next((o.name for o in description.observables if o.formula.strip() == x), "")
 

@@ -57,7 +57,7 @@ class Formulas:
         ]
 
     def period(self) -> Any:
-        """Return the period, 0 if there is none."""
+        """Return the period, or 0."""
         return self.read(("period",), self.description.period or "0")
 
     def fields(self) -> list[list[Any]]:

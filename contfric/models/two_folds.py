@@ -239,7 +239,7 @@ class _Tangencies:
         return found
 
     def newton(self, z: FloatArray, sizes: FloatArray) -> FloatArray | None:
-        """Return the solution that the shortest steps lead to from (t, y); None if there is none."""
+        """Return the solution that the shortest steps lead to from (t, y), or None."""
         for _ in range(_STEPS):
             with np.errstate(all="ignore"):
                 value = np.array(self.equations(z, self.vector), dtype=np.float64)

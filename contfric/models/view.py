@@ -44,7 +44,7 @@ class FlowView:
 
     @cached_property
     def period(self) -> float:
-        """Period of the excitation, 0 if there is none."""
+        """Period of the excitation; 0 without one."""
         return float(self.model.flow.period(self.vector, _NONE, _EMPTY))
 
     def observe(self, observable: str, t: float, y: FloatArray) -> float:

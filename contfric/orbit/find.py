@@ -19,7 +19,7 @@ from contfric.orbit.rest import check_rest, comes_to_rest, is_point, winds
 from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
-from contfric.orbit.solve import centred, settle
+from contfric.orbit.solve import centred, refine_with_symmetry
 from contfric.orbit.system import build_system
 from contfric.orbit.time_scale import time_scale
 from contfric.remember.journal import remembered
@@ -211,7 +211,7 @@ def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
         orbit = _orbit_of_lag(trajectory, lag, turns)
         if orbit is None:
             continue
-        solved = settle(shortest(settle(orbit)))
+        solved = refine_with_symmetry(shortest(refine_with_symmetry(orbit)))
         if solved.converged and solved.admissible and (mismatch <= _EXACT or _attracts(solved)):
             return solved
         if mismatch <= _EXACT and not solved.converged:
@@ -239,7 +239,7 @@ def _crept_to(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     ) < _SERIES * np.linalg.norm(step):
         return None
     orbit = _orbit_of_lag(trajectory, lag, turns)
-    solved = None if orbit is None else settle(shortest(settle(orbit)))
+    solved = None if orbit is None else refine_with_symmetry(shortest(refine_with_symmetry(orbit)))
     if solved is None or not (solved.converged and solved.admissible and _attracts(solved)):
         return None
     left = ratio / (1.0 - ratio) * step

@@ -219,7 +219,7 @@ def stretches(
         yield float(np.max(np.abs(gap)) + abs(slip)), joints
 
 
-def settle(orbit: Orbit) -> Orbit:
+def refine_with_symmetry(orbit: Orbit) -> Orbit:
     """Solve an orbit, on its half if it turns out symmetric."""
     solved = refine(orbit)
     if not solved.converged:

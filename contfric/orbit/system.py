@@ -77,7 +77,7 @@ class Layout(NamedTuple):
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
     departs : mode in which each hold is left, shape (N,); -1 where there is no hold
-    resets : surface of the reset that each segment begins behind, shape (N,); -1 where there is none
+    resets : surface of the reset that each segment begins behind, shape (N,); -1 without one
     returns : 1 for segments that begin on their exit surface, so that they may shrink to nothing, shape (N,);
         0 for the last where all do
     lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at

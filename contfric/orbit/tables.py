@@ -124,7 +124,7 @@ def tables(model: Model) -> Tables:
 
 
 def chatter_table(model: Model, modes: int) -> IntArray:
-    """Return the mode of chatter that impacts in a mode at a surface may lead to, -1 if there is none."""
+    """Return the mode of chatter that impacts in a mode at a surface may lead to, or -1."""
     found = np.full((modes, len(model.surfaces)), -1, dtype=np.int64)
     for own in model.chatters:
         for k, mode in enumerate(model.modes[:modes]):

@@ -18,7 +18,7 @@ from contfric.errors import (
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.solve import settle
+from contfric.orbit.solve import refine_with_symmetry
 from contfric.response.targets import Targets, targets_of
 
 if TYPE_CHECKING:
@@ -114,7 +114,9 @@ def _on_branch(model: Model, vector: FloatArray, branch: Branch) -> Iterator[Orb
         width = after[i] - before[i]
         share = (value - before[i]) / width if width != 0.0 else 0.0
         joints = (1.0 - share) * branch.joints[i] + share * branch.joints[i + 1]
-        orbit = settle(Orbit(branch.system, joints, vector.copy(), np.inf, Status.NOT_CONVERGED))
+        orbit = refine_with_symmetry(
+            Orbit(branch.system, joints, vector.copy(), np.inf, Status.NOT_CONVERGED)
+        )
         if orbit.converged and orbit.admissible:
             yield orbit
 

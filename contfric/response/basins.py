@@ -32,7 +32,7 @@ class Share:
     Attributes
     ----------
     name : name of the orbit, or what the solutions are
-    orbit : number of the orbit, -1 if there is none
+    orbit : number of the orbit; -1 without one
     count : starts
     share, low, high : share of all starts that are computed, with the limits of its 95 % interval (Wilson)
     """

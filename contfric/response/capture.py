@@ -36,7 +36,7 @@ NO_START, NOT_YET = -1, -2
 
 @helper
 def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def]
-    """Return the orbit whose joint a joint lies at; -1 if there is none."""
+    """Return the orbit whose joint a joint lies at, or -1."""
     for i in range(targets.key.shape[0]):
         if targets.key[i] != key:
             continue

@@ -200,7 +200,7 @@ def _gap(
 def _state_at(
     model: Model, vector: FloatArray, release: _Release, rests: str, t: float
 ) -> FloatArray:
-    """Return the state at a release at a time: on both surfaces, by Newton's method; nan if there is none."""
+    """Return the state at a release at a time: on both surfaces, by Newton's method, or nan."""
     y = np.zeros(len(model.states))
     pair = release.surface, model.surface_index[rests]
     for _ in range(_STEPS):

@@ -123,7 +123,7 @@ class ReleaseMap(Tabled):
     phases : ndarray, shape (k,)
         Phases of the releases that are possible, ascending.
     images : ndarray, shape (k,)
-        Phase of the next release; nan where there is none.
+        Phase of the next release; nan without one.
     returns : ndarray, shape (k,)
         Time until then.
     branch : ndarray, shape (k,)

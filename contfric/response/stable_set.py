@@ -274,7 +274,7 @@ class _Half:
         return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
     def _next(self, step: float) -> FloatArray | None:
-        """Return the point of the set on an arc; None if there is none, or it turns too much."""
+        """Return the point of the set on an arc; None without one, or where it turns too much."""
         for arc in _ARCS:
             angle = self._angle(step, -arc, arc)
             if angle is not None:
@@ -282,7 +282,7 @@ class _Half:
         return None
 
     def _beyond_break(self, longest: float) -> FloatArray | None:
-        """Return the nearest point of the set across a break; None if there is none within reach."""
+        """Return the nearest point of the set across a break; None without one within reach."""
         reach = max(longest, _REACH * float(np.hypot(*(self.high - self.low))))
         for step in np.geomspace(_SHORTEST * longest, reach, _GAPS):
             for one, other in pairwise(_FAN):

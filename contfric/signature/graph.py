@@ -60,7 +60,7 @@ def successors(model: Model, domain: str) -> dict[str, str]:
 
 
 def crossing(model: Model, source: str, target: str) -> str | None:
-    """Return the surface that leads from one domain to another, None if there is none.
+    """Return the surface that leads from one domain to another, or None.
 
     Where several surfaces do, the first in the order of the model's surfaces is returned.
 

@@ -72,7 +72,7 @@ def known_hold(name: str, model: Model) -> bool:
 
 
 def release_mode(model: Model, mode: str, surface: str) -> str | None:
-    """Return the mode that a regular release through a surface leads to; None if there is none."""
+    """Return the mode that a regular release through a surface leads to, or None."""
     for domain in model.domains_of(mode):
         target = model.transitions.get((domain.name, surface))
         if target is not None:

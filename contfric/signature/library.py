@@ -81,7 +81,7 @@ def _model_name(model: str | Model | None) -> str | None:
 
 
 def _entry(path: Path, key: str) -> str | None:
-    """Return one entry of a file, None if there is none: a broken file must not hide the others."""
+    """Return one entry of a file, or None: a broken file must not hide the others."""
     try:
         value = read_yaml(path).data.get(key)
     except NotationError:

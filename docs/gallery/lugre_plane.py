@@ -37,7 +37,7 @@ KINDS = (cf.Kind.BP, cf.Kind.SN)
 #: Symmetric orbits between these are left out (five loops of Fig. 18 that are like the first one), and all
 #: folds of asymmetric orbits but that at which the main branch turns: a curve takes 10 to 100 s.
 LOOPS, MAIN_FOLD = (0.41, 0.46), 0.55
-#: Places that are simulated, random starts of each, and periods that a solution may take to settle.
+#: Places that are simulated, random starts of each, and periods that a solution may take to converge.
 PLACES = (
     (0.56, 0.38),
     (0.56, 0.28),

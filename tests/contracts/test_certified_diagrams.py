@@ -147,3 +147,8 @@ def test_an_event_that_the_checker_refuses_is_not_in_the_file(
     own = files.event_data
     monkeypatch.setattr(files, "event_data", lambda proof: own(proof) | {"kind": "PD"})
     assert [part["certificate"] for part in files.checkable(proofs)] == ["orbit"]
+    diagram = cf.explore(orbit, "Omega", (0.538, 0.545), bridges=False)
+    found = diagram.certify()
+    assert found.unchecked and set(found.unchecked) == {e.label for e in found.events if e.proved}
+    assert "not in the file for a checker: SN_1a" in str(found)
+    assert not proved().unchecked

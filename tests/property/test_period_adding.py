@@ -76,7 +76,7 @@ def test_a_window_ends_where_a_stop_meets_the_surface(index: int) -> None:
         out = np.sign(tip.params["Omega"] - np.mean(window.range))
         for step, follows in ((-1e-9, True), (1e-9, False)):
             params = {**tip.params, "Omega": tip.params["Omega"] + out * step}
-            # the orbit itself moves by less than its margin does: settle next to it first
+            # the orbit itself moves by less than its margin does: converge next to it first
             run = cf.simulate(
                 "coulomb", params, state=tip.state(0.3), time=0.3, periods=16.0 * tip.periods
             )

@@ -138,7 +138,7 @@ def first_root(poly, first, terms, begin, sign, bound):  # type: ignore[no-untyp
     Returns
     -------
     tuple
-        (the root, -1 if there is none, no number if the search is too long; a place after it up to which
+        (the root; -1 without one, no number if the search is too long; a place after it up to which
         there is no other one).
     """
     sixth, rounding = bound[0], _ROUNDING * bound[1]

@@ -40,7 +40,7 @@ class BallModel:
     resets : dict
         The map of the extended state at each surface that has one, shape (D, D).
     period : arb
-        Period of the excitation, T; 0 if there is none.
+        Period of the excitation, T; 0 without one.
     turns : list of int
         The whole numbers ``w_k T / (2 pi)``.
     slopes : BallModel or None

@@ -28,7 +28,7 @@ def check_filippov(report: ModelReport, probe: Probe) -> None:
 
 
 def _beside(probe: Probe, domain: Domain, surface: str, side: int) -> str | None:
-    """Return the mode on one side of a domain that slides; None if there is none, or several."""
+    """Return the mode on one side of a domain that slides; None unless there is exactly one."""
     signs = {**domain.signs, surface: side}
     modes = {d.own_mode for d in probe.model.domains if d.signs == signs}
     return modes.pop() if len(modes) == 1 else None

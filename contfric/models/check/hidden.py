@@ -259,7 +259,7 @@ def _shifts(probe: Probe, found: Affine, beside: list[Probe]) -> list[str]:
 
 
 def _expression(model: Model, rows: FloatArray, values: FloatArray) -> str:
-    """Return a linear expression of the parameters with simple coefficients; empty if there is none."""
+    """Return a linear expression of the parameters with simple coefficients, or an empty text."""
     fit = np.linalg.lstsq(rows, values, rcond=1e-12)[0]
     simple = np.round(fit / _UNIT) * _UNIT
     if not np.allclose(rows @ simple, values, rtol=_SAME, atol=_SAME):

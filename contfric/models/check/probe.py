@@ -45,7 +45,7 @@ class Probe:
 
     @property
     def period(self) -> float:
-        """Period of the excitation, 0 if there is none."""
+        """Period of the excitation; 0 without one."""
         return self.flow.period
 
     def share(self, states: int) -> int:
