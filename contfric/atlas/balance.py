@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.matching import ROUNDING, same_event, same_place
+from contfric.atlas.matching import ROUNDING, same_event, same_location
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import Bifurcation, EndReason, Kind
@@ -188,7 +188,7 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
     for k, node in enumerate(diagram.nodes):
         if k == number or node.mirrored:
             continue
-        if same_place(node.bifurcation, b, diagram.parameter, width, ROUNDING):
+        if same_location(node.bifurcation, b, diagram.parameter, width, ROUNDING):
             found.append(k)
     slack = _slack(diagram, found)
     value = b.params[diagram.parameter]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
-from contfric.atlas.matching import same_event, same_place, telling_kind
+from contfric.atlas.matching import same_event, same_location, telling_kind
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
@@ -118,7 +118,7 @@ def _is_relabelling_at_end(event: Event, events: list[Event], settings: Settings
     b = event.bifurcation
     return b.kind is Kind.T and any(
         other.bifurcation.kind in TERMINAL
-        and same_place(other.bifurcation, b, settings.parameter, settings.width)
+        and same_location(other.bifurcation, b, settings.parameter, settings.width)
         for other in events
     )
 

@@ -21,7 +21,7 @@ from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
 
-#: Motions this near to each other (one may have a hold more) may be taken for one where their parameters
+#: Solutions this near to each other (one may have a hold more) may be taken for one where their parameters
 #: cannot be told apart.
 _ALIKE = 1e-3
 #: A margin this small at a smooth event: the branch that leaves it, along which margins change in proportion

@@ -8,7 +8,7 @@ from itertools import chain
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
-from contfric.atlas.matching import same_kind, same_place
+from contfric.atlas.matching import same_kind, same_location
 from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
 from contfric.continuation.events import End, EndReason, Kind, Verdict
@@ -107,7 +107,7 @@ def ends_at(end: End, event: Event, settings: Settings) -> bool:
     last, b = end.bifurcation, event.bifurcation
     if last is None or not same_kind(last, b):
         return False
-    return same_place(last, b, settings.parameter, settings.width)
+    return same_location(last, b, settings.parameter, settings.width)
 
 
 def foresee_departures(state: Exploration, event: Event) -> None:

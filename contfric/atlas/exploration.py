@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from contfric.atlas.collect import Event
-from contfric.atlas.matching import SAME_MOTION, identity, on_branch, same_event, stops_distance
+from contfric.atlas.matching import SAME_SOLUTION, identity, on_branch, same_event, stops_distance
 from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
@@ -28,12 +28,12 @@ Progress = Callable[[str], None]
 _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 #: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
 #: at the event: located tips are good to 1e-10, those near a singular point to 1e-6.
-_SAME_PLACE, _SAME_STOPS = 1e-8, 1e-6
+_SAME_LOCATION, _SAME_STOPS = 1e-8, 1e-6
 
 
 def _alike(one: Orbit, other: Orbit) -> bool:
     """Tell whether two orbits are one solution: holds of other lengths may lead to the same stops."""
-    return one.outline.apart(other.outline) < SAME_MOTION
+    return one.outline.apart(other.outline) < SAME_SOLUTION
 
 
 def _combines(bifurcation: Bifurcation) -> bool:
@@ -158,6 +158,6 @@ class Exploration:
             for tip in (branch[0], branch[-1]):
                 gap = abs(tip.params[branch.parameter] - orbit.params[branch.parameter])
                 near = stops_distance(tip.stops, orbit.stops, mirror) < _SAME_STOPS
-                if gap < _SAME_PLACE * width and near and _alike(tip, orbit):
+                if gap < _SAME_LOCATION * width and near and _alike(tip, orbit):
                     return index
         return None

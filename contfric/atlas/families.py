@@ -10,7 +10,7 @@ from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.atlas.matching import SAME_MOTION, stops_apart
+from contfric.atlas.matching import SAME_SOLUTION, stops_apart
 from contfric.continuation.candidates import candidates
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import TERMINAL, End, Kind, Verdict
@@ -128,5 +128,5 @@ def meets(end: End, event: Event, settings: Settings, kinds: frozenset[Kind] = T
     gap = abs(a.params[settings.parameter] - b.params[settings.parameter])
     if gap > max(a.accuracy, b.accuracy) * settings.width:
         return False
-    apart = stops_apart(a.orbit, b.orbit) < SAME_MOTION
-    return apart or a.outline.apart(b.outline) < SAME_MOTION  # or its mirror image
+    apart = stops_apart(a.orbit, b.orbit) < SAME_SOLUTION
+    return apart or a.outline.apart(b.outline) < SAME_SOLUTION  # or its mirror image

@@ -25,7 +25,7 @@ from contfric.atlas.leaving_event import (
     leave_singular,
     settings_for,
 )
-from contfric.atlas.matching import SAME_MOTION, same_kind
+from contfric.atlas.matching import SAME_SOLUTION, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -266,7 +266,7 @@ def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
     last, b = branch.ends[1].bifurcation, event.bifurcation
     if last is None or not branch.bridge or branch.arc[-1] >= _ROUNDED:
         return False
-    return same_kind(last, b) and last.outline.apart(b.outline) < SAME_MOTION
+    return same_kind(last, b) and last.outline.apart(b.outline) < SAME_SOLUTION
 
 
 # --------------------------------------------------------------------------- branch points

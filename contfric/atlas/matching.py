@@ -21,7 +21,7 @@ from contfric.orbit.system import Itinerary
 from contfric.signature import ReducedItinerary, canonical_itinerary
 
 #: Events whose parameters agree to their accuracy and whose solutions agree to this are one.
-SAME_MOTION = 1e-4
+SAME_SOLUTION = 1e-4
 #: Orbits solved at the same parameter are one if their stops agree to this (relative to 1 + their size).
 _SAME_ORBIT = 1e-8
 #: Names of one and the same event, those that say more first.
@@ -87,10 +87,10 @@ def stops_distance(a: FloatArray, b: FloatArray, mirror: bool) -> float:
 
 def same_event(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
     """Tell whether two branches have met the same event (or its mirror image), by how well it is known."""
-    return same_kind(a, b) and same_place(a, b, parameter, width, ROUNDING)
+    return same_kind(a, b) and same_location(a, b, parameter, width, ROUNDING)
 
 
-def same_place(
+def same_location(
     a: Bifurcation, b: Bifurcation, parameter: str, width: float, least: float = ACCURACY
 ) -> bool:
     """Tell whether two events have the same parameters and the same solution (or its mirror image).
@@ -100,7 +100,7 @@ def same_place(
     least : parameters this near (relative to the range) are the same, however well they are known
     """
     gap = abs(a.params[parameter] - b.params[parameter]) / width
-    if gap > _APART or not a.outline.apart(b.outline) < SAME_MOTION:
+    if gap > _APART or not a.outline.apart(b.outline) < SAME_SOLUTION:
         return False
     # accuracies are asked for last: they cost
     return gap <= least or gap <= _TWICE * max(a.accuracy, b.accuracy)
@@ -158,7 +158,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
         solved = refine(guess, damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
-        if alike and orbit.outline.apart(solved.outline) < SAME_MOTION:
+        if alike and orbit.outline.apart(solved.outline) < SAME_SOLUTION:
             return True
     return False
 

@@ -128,7 +128,7 @@ class Plane(Shown):
     def _same(self, a: SpecialPoint, b: SpecialPoint) -> bool:
         widths = self.ranges[:, 1] - self.ranges[:, 0]
         gaps = [abs(a.params[n] - b.params[n]) for n in self.parameters]
-        near = _SAME_PLACE if a.located and b.located else _SAME_ROUGHLY
+        near = _SAME_LOCATION if a.located and b.located else _SAME_ROUGHLY
         same = bool(np.all(np.array(gaps) < near * widths))
         return same and (a.kind is b.kind and set(a.name.split("-")) == set(b.name.split("-")))
 
@@ -181,6 +181,6 @@ class Plane(Shown):
 
 #: Points of codimension two of one kind this near to each other (relative to the ranges) are one: where
 #: conditions are nearly singular they are located to the root of rounding.
-_SAME_PLACE = 1e-6
+_SAME_LOCATION = 1e-6
 #: The same where one of them is not bracketed to its last digits: the root of what a singular state is.
 _SAME_ROUGHLY = 1e-4

@@ -22,7 +22,7 @@ import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.degenerate import degenerate_events, unresolved
-from contfric.atlas.matching import identity, on_branch, same_place
+from contfric.atlas.matching import identity, on_branch, same_location
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import ACCURACY, Bifurcation, EndReason
@@ -243,7 +243,7 @@ def differences(one: Diagram, other: Diagram) -> Iterator[str]:
 
 
 def _same_bifurcation(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:
-    return a.kind is b.kind and same_place(a, b, parameter, width)
+    return a.kind is b.kind and same_location(a, b, parameter, width)
 
 
 def _is_at(event: Bifurcation, node: Node, diagram: Diagram) -> bool:
@@ -258,7 +258,7 @@ def _is_at(event: Bifurcation, node: Node, diagram: Diagram) -> bool:
         return False
     return any(
         abs(b.params[parameter] - value) <= ACCURACY * width
-        and same_place(event, b, parameter, width)
+        and same_location(event, b, parameter, width)
         for i in node.branches
         for b in diagram.branches[i].bifurcations
     )

@@ -25,7 +25,7 @@ from contfric.chaos.endings import (
     starts_at_rest,
     write_nothing,
 )
-from contfric.chaos.one_motion import carry_behind, carry_on, try_cycle, write_last
+from contfric.chaos.one_motion import carry_on, carry_through_reset, try_cycle, write_last
 from contfric.chaos.rows import CellRows, Limits, Starting
 from contfric.chaos.starting import start_mode
 from contfric.chaos.tangent import (
@@ -47,7 +47,7 @@ from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
 from contfric.orbit.sides import (
-    behind_event,
+    surfaces_after,
 )
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (
@@ -60,15 +60,15 @@ LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
 CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], CellRows)
 
 
-#: Motions that are followed side by side: enough for the vectors of a processor, and few enough that what is
-#: kept of each stays near it.
+#: Solutions that are followed side by side: enough for the vectors of a processor, and few enough that what
+#: is kept of each stays near it.
 SIDE_BY_SIDE = 32
 #: The mode of a place without a motion, and how far a motion is: before the averages, in them, or behind.
 IDLE = -1
 BEFORE, AVERAGING, BEHIND = range(3)
 
 
-class Motions(NamedTuple):
+class Solutions(NamedTuple):
     """Where some solutions are, one in each place.
 
     Attributes
@@ -99,10 +99,10 @@ class Motions(NamedTuple):
 
 
 @allocating_helper
-def new_motions(width, n, parameters):  # type: ignore[no-untyped-def]
-    """Return places for motions."""
+def new_solutions(width, n, parameters):  # type: ignore[no-untyped-def]
+    """Return places for solutions."""
     whole, real = np.empty((8, width), dtype=np.int64), np.empty((6, width))
-    return Motions(
+    return Solutions(
         *(whole[0], whole[1], whole[2], whole[3], whole[4], whole[5], whole[6], whole[7]),
         *(real[0], real[1], real[2], real[3], real[4], real[5]),
         np.empty((width, parameters)),
@@ -110,19 +110,19 @@ def new_motions(width, n, parameters):  # type: ignore[no-untyped-def]
 
 
 @helper
-def begin(motions, k, cell, start, y, p, limits, workspaces):  # type: ignore[no-untyped-def]
+def begin(solutions, k, cell, start, y, p, limits, workspaces):  # type: ignore[no-untyped-def]
     """Put a cell into place k of the solutions; ``start`` is (mode, surfaces it is on, phase, period)."""
     mode, on, phase, period = start
-    motions.cell[k], motions.mode[k], motions.on[k] = cell, mode, on
-    motions.live[k], motions.cycle[k], motions.joint[k] = y.shape[0], 0, 0
-    motions.stage[k] = AVERAGING if limits.transient == 0 else BEFORE
-    motions.end[k], motions.time[k], motions.period[k] = limits.periods, phase, period
-    motions.longest[k] = HOLD_PERIODS * period
-    motions.total[k], motions.lowest[k], motions.rise[k] = 0.0, 0.0, 0.0
+    solutions.cell[k], solutions.mode[k], solutions.on[k] = cell, mode, on
+    solutions.live[k], solutions.cycle[k], solutions.joint[k] = y.shape[0], 0, 0
+    solutions.stage[k] = AVERAGING if limits.transient == 0 else BEFORE
+    solutions.end[k], solutions.time[k], solutions.period[k] = limits.periods, phase, period
+    solutions.longest[k] = HOLD_PERIODS * period
+    solutions.total[k], solutions.lowest[k], solutions.rise[k] = 0.0, 0.0, 0.0
     for j in range(y.shape[0]):
         workspaces.walk.y[j] = y[j]
     for j in range(p.shape[0]):
-        motions.p[k, j] = p[j]
+        solutions.p[k, j] = p[j]
     workspaces.walk.at_once[0], workspaces.walk.at_once[2] = 0, 0
     seed(workspaces.frame, 0)
     forget(workspaces.memory)
@@ -130,50 +130,60 @@ def begin(motions, k, cell, start, y, p, limits, workspaces):  # type: ignore[no
 
 
 @helper
-def go_on(functions, tables, ranks, motions, k, limits, workspaces, rows):  # type: ignore[no-untyped-def]
+def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # type: ignore[no-untyped-def]
     """Follow motion k to its next joint; where it ends, write what it is and its exponents, and say so."""
     walk, growth, averages = workspaces.walk, workspaces.growth, workspaces.averages
-    surfaces, p, cell = tables.observables.shape[0], motions.p[k], motions.cell[k]
-    mode, on, t, period = motions.mode[k], motions.on[k], motions.time[k], motions.period[k]
-    live = motions.live[k]
+    surfaces, p, cell = tables.observables.shape[0], solutions.p[k], solutions.cell[k]
+    mode, on, t, period = solutions.mode[k], solutions.on[k], solutions.time[k], solutions.period[k]
+    live = solutions.live[k]
     if walk.at_once[1] == 0:
         outcome, surface, following, duration, turns, t, live = carry_on(
             functions, tables, ranks, mode, on, t, p, period, live, workspaces
         )
     else:
-        outcome, surface, following, duration, turns, t, live = carry_behind(
+        outcome, surface, following, duration, turns, t, live = carry_through_reset(
             functions, tables, ranks, mode, on, t, p, period, live, workspaces
         )
     if outcome != ARRIVED:
         write_last(functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell)
         return True
-    total = motions.total[k] + (growth[0] if live > 0 else 0.0)
-    lowest = min(motions.lowest[k], total)
-    rise = max(motions.rise[k], total - lowest)
-    on = behind_event(tables, mode, surface)
-    mode, joint, cycle = following, motions.joint[k] + 1, motions.cycle[k] + turns
+    total = solutions.total[k] + (growth[0] if live > 0 else 0.0)
+    lowest = min(solutions.lowest[k], total)
+    rise = max(solutions.rise[k], total - lowest)
+    on = surfaces_after(tables, mode, surface)
+    mode, joint, cycle = following, solutions.joint[k] + 1, solutions.cycle[k] + turns
     key = mode * surfaces + surface
     timeless = walk.at_once[1] & 1 != 0
     at = mode, on, key, t
-    motions.cycle[k] = cycle
+    solutions.cycle[k] = cycle
     back = returned(workspaces.memory, key, cycle, joint, t, walk.y, period, timeless)
     if back[0] > 0 and try_cycle(
         functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
     ):
         return True
-    if motions.stage[k] == AVERAGING:
+    if solutions.stage[k] == AVERAGING:
         gather(averages.pending, growth, live, duration, walk.y)
         if turns > 0 and averaged(
-            averages, live, turns, cycle >= motions.end[k], limits.tolerance, rows, cell
+            averages, live, turns, cycle >= solutions.end[k], limits.tolerance, rows, cell
         ):
-            motions.stage[k], motions.end[k] = BEHIND, cycle + limits.confirm
-    elif motions.stage[k] == BEFORE and cycle >= limits.transient:
-        motions.stage[k], motions.end[k] = AVERAGING, cycle + limits.periods
+            solutions.stage[k], solutions.end[k] = BEHIND, cycle + limits.confirm
+    elif solutions.stage[k] == BEFORE and cycle >= limits.transient:
+        solutions.stage[k], solutions.end[k] = AVERAGING, cycle + limits.periods
         seed(workspaces.frame, live)  # what only the transient forgot counts again
         live = walk.y.shape[0]
-    motions.mode[k], motions.on[k], motions.live[k], motions.joint[k] = mode, on, live, joint
-    motions.time[k], motions.total[k], motions.lowest[k], motions.rise[k] = t, total, lowest, rise
-    return motions.stage[k] == BEHIND and cycle >= motions.end[k]
+    solutions.mode[k], solutions.on[k], solutions.live[k], solutions.joint[k] = (
+        mode,
+        on,
+        live,
+        joint,
+    )
+    solutions.time[k], solutions.total[k], solutions.lowest[k], solutions.rise[k] = (
+        t,
+        total,
+        lowest,
+        rise,
+    )
+    return solutions.stage[k] == BEHIND and cycle >= solutions.end[k]
 
 
 @helper
@@ -186,7 +196,7 @@ def walls_of(tables):  # type: ignore[no-untyped-def]
 
 
 @helper
-def begun(functions, tables, starting, time, p, y, motions, k, cell, limits, workspaces, rows):  # type: ignore[no-untyped-def]
+def begun(functions, tables, starting, time, p, y, solutions, k, cell, limits, workspaces, rows):  # type: ignore[no-untyped-def]
     """Put a cell into place k; or write what it is, if there is nothing to follow, and return False."""
     walk, state = workspaces.walk, workspaces.state
     rows.turns[cell], rows.followed[cell] = 0, 0
@@ -199,7 +209,7 @@ def begun(functions, tables, starting, time, p, y, motions, k, cell, limits, wor
     mode, on = start_mode(functions, tables, starting, time, y, p, state)
     if mode >= 0:
         start = mode, on, time - math.floor(time / period) * period, period
-        begin(motions, k, cell, start, y, p, limits, workspaces)
+        begin(solutions, k, cell, start, y, p, limits, workspaces)
         return True
     ranks, cycle = starting.ranks, workspaces.cycle
     for j in range(y.shape[0]):
@@ -223,22 +233,22 @@ def follow_all(  # type: ignore[no-untyped-def]
     limits,
     stop,
     rows,
-    motions,
+    solutions,
     space,
     memory,
 ):
     """Follow the solutions of all cells; see :func:`follow_cells`."""
     tables, starting, rows = by_reference(tables), by_reference(starting), by_reference(rows)
-    motions, space, limits = by_reference(motions), by_reference(space), by_reference(limits)
-    cells, width = states.shape[0], motions.mode.shape[0]
+    solutions, space, limits = by_reference(solutions), by_reference(space), by_reference(limits)
+    cells, width = states.shape[0], solutions.mode.shape[0]
     following, alone, like = 0, walls_of(tables) != 0, by_reference(place(space, 0))
     for k in range(width):
-        motions.mode[k] = IDLE
+        solutions.mode[k] = IDLE
         store_at(memory, k, place(space, k))
     while stop[0] == 0:
         active = 0
         for k in range(width):
-            while motions.mode[k] == IDLE and following < cells:
+            while solutions.mode[k] == IDLE and following < cells:
                 begun(
                     functions,
                     tables,
@@ -246,7 +256,7 @@ def follow_all(  # type: ignore[no-untyped-def]
                     time,
                     vectors[following],
                     states[following],
-                    motions,
+                    solutions,
                     k,
                     following,
                     limits,
@@ -254,30 +264,30 @@ def follow_all(  # type: ignore[no-untyped-def]
                     rows,
                 )
                 following += 1
-            active += 1 if motions.mode[k] != IDLE else 0
+            active += 1 if solutions.mode[k] != IDLE else 0
         if active == 0:
             break
         if not alone:
             flow.together(
                 width,
-                motions.mode,
-                motions.on,
-                motions.time,
+                solutions.mode,
+                solutions.on,
+                solutions.time,
                 space.walk.y,
-                motions.p,
-                motions.longest,
+                solutions.p,
+                solutions.longest,
                 space.walk.ahead,
                 space.walk.meets,
                 space.state.after,
                 space.walk.jac,
             )
         for k in range(width):
-            if motions.mode[k] == IDLE:
+            if solutions.mode[k] == IDLE:
                 continue
             workspaces = reference_at(memory, k, like)
-            if go_on(functions, tables, starting.ranks, motions, k, limits, workspaces, rows):
-                rows.followed[motions.cell[k]] = motions.cycle[k]
-                motions.mode[k] = IDLE
+            if go_on(functions, tables, starting.ranks, solutions, k, limits, workspaces, rows):
+                rows.followed[solutions.cell[k]] = solutions.cycle[k]
+                solutions.mode[k] = IDLE
             space.walk.meets[k] = SINGLY
 
 
@@ -311,7 +321,7 @@ def follow_cells(  # type: ignore[no-untyped-def]
     """
     cells, n = states.shape
     width = min(SIDE_BY_SIDE, cells)
-    motions, space = new_motions(width, n, vectors.shape[1]), new_cell_workspaces(width, n)
+    solutions, space = new_solutions(width, n, vectors.shape[1]), new_cell_workspaces(width, n)
     memory = np.empty(width * words_for(space), dtype=np.int64)
     follow_all(
         functions,
@@ -324,7 +334,7 @@ def follow_cells(  # type: ignore[no-untyped-def]
         limits,
         stop,
         rows,
-        motions,
+        solutions,
         space,
         memory,
     )

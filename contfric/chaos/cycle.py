@@ -1,4 +1,4 @@
-"""Motions that have become periodic: recognised at a near return, solved for, exponents exact; compiled.
+"""Solutions that have become periodic: recognised at a near return, solved for, exponents exact; compiled.
 
 Three joints of the past are remembered: one of the last period, one of the last 8, and one of a stretch that
 doubles from 64 on (R. P. Brent, BIT 20 (1980) 176-184). A later joint at the same surface, before the same
@@ -35,7 +35,7 @@ from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import dense_solve
 from contfric.orbit.sides import (
-    behind_event,
+    surfaces_after,
 )
 from contfric.orbit.spectrum import spectrum
 from contfric.orbit.system import IntArray
@@ -240,7 +240,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
         for k in range(rank):
             cycle.logs[k] += cycle.growth[k]
         turns += more
-        on = behind_event(tables, mode, surface)
+        on = surfaces_after(tables, mode, surface)
         mode = following
         key = mode * tables.observables.shape[0] + surface
     return key, rank, turns, t, lasted

@@ -99,7 +99,7 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces)
 
 
 @helper
-def carry_behind(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
+def carry_through_reset(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
     """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
     walk, workspace = workspaces.walk, workspaces.state
     outcome, surface, following, duration, turns, t = to_joint(

@@ -18,7 +18,7 @@ from numba.core.extending import intrinsic, models, register_model
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-#: Motions side by side: one vector of AVX-512, two of AVX2.
+#: Solutions side by side: one vector of AVX-512, two of AVX2.
 LANES = 8
 _BIT = ir.IntType(1)
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)

@@ -35,7 +35,7 @@ from contfric.orbit.monitor import (
 )
 from contfric.orbit.newton import CHECKS, MULTIPLIERS, SOLVES
 from contfric.orbit.spectrum import multipliers
-from contfric.orbit.stationary import find_behind, find_stationary
+from contfric.orbit.stationary import find_after_reset, find_stationary
 from contfric.orbit.system import IntArray
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
@@ -79,7 +79,7 @@ def plain_margin(functions, layout, index, z, p, workspace):  # type: ignore[no-
         i, c = layout.interior[index, 0], layout.observables[layout.interior[index, 1]]
         equations, stationary = workspace.equations, workspace.stationary
         if layout.resets[i] >= 0:
-            found = find_behind(functions, layout, i, c, z, p, equations, stationary)
+            found = find_after_reset(functions, layout, i, c, z, p, equations, stationary)
         else:
             found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
         return interior_margin(functions, layout, index, found, z, p, equations, stationary)

@@ -27,7 +27,7 @@ from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
-from contfric.orbit.slides import SAME_MOTION
+from contfric.orbit.slides import SAME_SOLUTION
 from contfric.orbit.system import Itinerary, build_system
 
 
@@ -165,7 +165,7 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
     """
     edited, moves = edited_whole(orbit, outcomes)
     half = half_of(edited.model, edited.itinerary, edited.periods)
-    if half is not None and edited.mirror_distance <= SAME_MOTION:
+    if half is not None and edited.mirror_distance <= SAME_SOLUTION:
         part = build_system(edited.model, half, edited.periods, half=True)
         end = float(edited.joints[len(half), 0])
         joints = clocked(edited.model, edited.joints[: len(half)], end)

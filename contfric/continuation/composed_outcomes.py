@@ -22,7 +22,7 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 
 from __future__ import annotations
 
-from contfric.continuation.shared_outcomes import in_other_order, limit_behind, with_other_state
+from contfric.continuation.shared_outcomes import in_other_order, limit_after, with_other_state
 from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
@@ -89,7 +89,7 @@ def _sharing(
     short = [
         not _lasts(orbit, (i + 1 + k) % len(itinerary)) for k in range(min(2, len(itinerary) - 2))
     ]
-    limit = limit_behind(model, itinerary, i, surface)
+    limit = limit_after(model, itinerary, i, surface)
     if limit is not None:
         edit, reason = with_other_state(model, itinerary, i, limit, vanishes=any(short[:1]))
     else:

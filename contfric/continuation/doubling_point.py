@@ -96,7 +96,7 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     return len(sides) == 2 and sides[0] * sides[1] < 0.0
 
 
-def place_error(orbit: Orbit, active: int) -> float:
+def location_error(orbit: Orbit, active: int) -> float:
     """Return how well the parameter of a located opening is known: by rounding of what vanishes there.
 
     What vanishes has a slope along the curve of orbits, and so has the parameter; where that turns, its

@@ -34,7 +34,7 @@ _CONSTANT = 1e-7
 #: A located fold has a slope of rounding; this share of those around it is left at a jump only.
 _LEFT = 0.1
 #: A step shorter than this (arclength) is not taken back: there is nothing to be found in between.
-SHORTEST_LEAP = 1e-7
+SHORTEST_OVERSHOOT = 1e-7
 #: An event with the point of the branch at which it is.
 Located = tuple[Bifurcation, Point]
 
@@ -76,7 +76,7 @@ def _split_between(
     split = as_split(found, before.tangent + share * (after.tangent - before.tangent))
     if split is None:
         return None
-    far = after.arc - before.arc > SHORTEST_LEAP
+    far = after.arc - before.arc > SHORTEST_OVERSHOOT
     return replace(split, bound=ROUGH), replace(before, lost=far)
 
 

@@ -34,7 +34,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
-from contfric.orbit.slides import SAME_MOTION, SHORT, resting_modes, time_unit
+from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
 from contfric.orbit.system import Itinerary, Margin, Test, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
@@ -124,7 +124,7 @@ def _moves(orbit: Orbit) -> bool:
         if mode not in resting and last > SHORT * time_unit(orbit):
             start = float(begin[0]), begin[1:]
             moved = [orbit.flow.state(mode, *start, float(last * share)) for share in _SHARES]
-            if np.max(np.abs(np.array(moved) - begin[1:])) > SAME_MOTION:
+            if np.max(np.abs(np.array(moved) - begin[1:])) > SAME_SOLUTION:
                 return True
     return False
 

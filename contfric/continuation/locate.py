@@ -5,7 +5,7 @@ from __future__ import annotations
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.sliding import sliding_events
-from contfric.continuation.smooth import SAME_PLACE, SAME_TANGENCY, smooth_events
+from contfric.continuation.smooth import SAME_LOCATION, SAME_TANGENCY, smooth_events
 from contfric.orbit.orbit import Orbit
 
 #: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
@@ -44,7 +44,7 @@ def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings)
     if event.kind in TERMINAL:
         return False
     apart = abs(point.arc - end.arc)
-    if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_PLACE):
+    if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_LOCATION):
         return True
     if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
         return False

@@ -15,7 +15,7 @@ import numpy as np
 
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
-from contfric.continuation.doubling_point import opening, place_error, refined_opening
+from contfric.continuation.doubling_point import location_error, opening, refined_opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Settings
 from contfric.continuation.side import first_point
@@ -68,7 +68,9 @@ def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurca
         return None
     kind = Kind.BP if branch.system.half else Kind.PD
     position = branch.arc[k] + low * (branch.arc[k + 1] - branch.arc[k])
-    bound = ACCURACY if refined is None else max(LEAST, place_error(there, active) / settings.width)
+    bound = (
+        ACCURACY if refined is None else max(LEAST, location_error(there, active) / settings.width)
+    )
     return Bifurcation(
         *(kind, there.params, there, (), float(position), False, False),
         bound=bound,

@@ -43,7 +43,7 @@ from contfric.orbit.followed import (
 )
 from contfric.orbit.holds import NO_PIN
 from contfric.orbit.monitor import count_margins, is_doubled
-from contfric.orbit.stationary import find_behind, find_stationary
+from contfric.orbit.stationary import find_after_reset, find_stationary
 
 #: A parameter that changes more slowly than this (in ranges, by arclength) is constant: the sign of its slope
 #: is rounding.
@@ -195,7 +195,7 @@ def recall(way, points, row):  # type: ignore[no-untyped-def]
         if 0 < r < layout.interior.shape[0] and segment_and_observable(layout, r - 1) == (i, c):
             continue
         if layout.resets[i] >= 0:
-            found = find_behind(functions, layout, i, c, z, way.p, equations, stationary)
+            found = find_after_reset(functions, layout, i, c, z, way.p, equations, stationary)
         else:
             found = find_stationary(functions, layout, i, c, z, way.p, equations.last, stationary)
         keep_values(followed, r, found, stationary)

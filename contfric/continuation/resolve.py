@@ -18,7 +18,7 @@ from contfric.continuation.section_joints import (
 )
 from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_PLACE
+from contfric.continuation.smooth import SAME_LOCATION
 from contfric.continuation.stopping import stop_between
 from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.orbit.orbit import Orbit
@@ -140,4 +140,4 @@ def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: fl
 
 def _is_start(side: Side, before: Point, point: Point) -> bool:
     """Tell whether a change of labels happens at the very start of a side, at an event."""
-    return side.count == 2 and point.arc - before.arc < SAME_PLACE
+    return side.count == 2 and point.arc - before.arc < SAME_LOCATION

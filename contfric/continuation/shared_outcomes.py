@@ -17,7 +17,7 @@ from contfric.orbit.system import Itinerary
 from contfric.signature.edits import Edit
 
 
-def limit_behind(model: ComposedModel, itinerary: Itinerary, i: int, surface: str) -> Limit | None:
+def limit_after(model: ComposedModel, itinerary: Itinerary, i: int, surface: str) -> Limit | None:
     """Return the limit of a shared load that is met after a joint; None if it is no such thing."""
     limit = model.composition.limit(surface)
     return None if limit is None or surface in model.composition.ways(itinerary[i][0]) else limit

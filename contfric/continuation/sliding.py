@@ -54,7 +54,7 @@ def sliding_events(
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     point, here = _pulled_in(orbit, before, point, settings)
-    first = _stop_behind(here, point, first)
+    first = _stop_after(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together, known = _TOGETHER, 0.0
     rough = False
@@ -113,7 +113,7 @@ def _is_inside(here: Orbit) -> bool:
     return bool(lasts.min() >= 0.0 and here.margins.min(initial=0.0) > -_NEGATIVE)
 
 
-def _stop_behind(here: Orbit, point: Point, first: int) -> int:
+def _stop_after(here: Orbit, point: Point, first: int) -> int:
     """Return the margin of the stop that a segment of no length any more begins at, if that vanishes too.
 
     Where nothing jumps, a slide between two stops shrinks to nothing as the first of them meets the
@@ -122,7 +122,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     tests = here.system.tests
     test = tests[first]
     if test.margin is Margin.LASTING:
-        return _hold_behind(here, first)
+        return _hold_after(here, first)
     if test.margin in (Margin.ENTRY, Margin.JOINT):
         return _grazed_stop(here, point, _grazed_wall(here, point, first))
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
@@ -144,7 +144,7 @@ def _stop_behind(here: Orbit, point: Point, first: int) -> int:
     return at_stop[0] if at_stop else first
 
 
-def _hold_behind(here: Orbit, first: int) -> int:
+def _hold_after(here: Orbit, first: int) -> int:
     """Return the margin of the hold that a slide of no length any more leaves: it cannot be left any more."""
     tests = here.system.tests
     if here.model.mode_by_name[here.system.itinerary[tests[first].segment][0]].sliding:
@@ -283,7 +283,7 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     rank = {Margin.LASTING: 0, Margin.JOINT: 1}
     first = min(near, key=lambda test: rank.get(test.margin, 2))
     if first.margin is Margin.LASTING:
-        first = orbit.system.tests[_hold_behind(here, orbit.system.tests.index(first))]
+        first = orbit.system.tests[_hold_after(here, orbit.system.tests.index(first))]
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
     found = bifurcation_at(kind, here, tip, None, tip, settings, group)

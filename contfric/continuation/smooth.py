@@ -11,7 +11,7 @@ from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Kind
 from contfric.continuation.folds import (
     NEAR_ONE,
-    SHORTEST_LEAP,
+    SHORTEST_OVERSHOOT,
     Located,
     crossing_in,
     fold_at,
@@ -28,7 +28,7 @@ from contfric.orbit.system import Margin, Test
 
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
-SAME_PLACE = 1e-7
+SAME_LOCATION = 1e-7
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 SAME_TANGENCY = 2e-6
@@ -103,7 +103,7 @@ def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
     if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
         return beyond
     here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-    told = point_before(here, beyond, SAME_PLACE, settings)
+    told = point_before(here, beyond, SAME_LOCATION, settings)
     return told if told is not None and np.isfinite(told.tests[-EXTRA:]).all() else None
 
 
@@ -117,7 +117,7 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
     """
     step = after.arc - before.arc
     # next to an exit without a rate a multiplier has a pole, to which no point is told nearer than this
-    small = min(_NUDGE * step, 0.01 * SAME_PLACE)
+    small = min(_NUDGE * step, 0.01 * SAME_LOCATION)
     if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
         return False
     over_step = abs(float(after.tests[index] - before.tests[index]))
@@ -186,7 +186,7 @@ def _overshot(
 
     A step as short as can be is not: then the event is reported as not located.
     """
-    if after.arc - before.arc <= SHORTEST_LEAP:
+    if after.arc - before.arc <= SHORTEST_OVERSHOOT:
         return not_located(orbit, kind, before, beyond, settings)
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     found = bifurcation_at(kind, here, before, beyond, before, settings)
@@ -209,13 +209,13 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
         if before.labels[k] == after.labels[k]:
             continue
         places = locate_label(orbit, before, after, settings, k)
-        if len(places) > 1 and places[1].arc - places[0].arc < SAME_PLACE:
+        if len(places) > 1 and places[1].arc - places[0].arc < SAME_LOCATION:
             places.pop()
         if not places and not _vanishes(orbit, k, (before, after), active):
             found.append(not_located(orbit, Kind.T, before, after, settings))
         for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
-            test = Test(*_label_place(orbit, k))
+            test = Test(*_label_location(orbit, k))
             b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
             found.append((b, point))
     return _once(found) if orbit.model.joined else found
@@ -238,7 +238,7 @@ def _once(found: list[Located]) -> list[Located]:
     return kept
 
 
-def _label_place(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
+def _label_location(orbit: Orbit, k: int) -> tuple[Margin, int, str]:
     segment, observable, *_ = orbit.system.layout.labels[k]
     name = orbit.model.observables[int(observable)].name
     return Margin.INTERIOR, int(segment), name

@@ -17,7 +17,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SAME_MOTION, repeats, repetitions, slides_of, time_unit
+from contfric.orbit.slides import SAME_SOLUTION, repeats, repetitions, slides_of, time_unit
 from contfric.orbit.system import Itinerary, build_system, mirror_mode
 
 
@@ -197,7 +197,7 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     else:
         gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * period) % period - 0.5 * period)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    fits = (gaps.max(axis=2) < SAME_MOTION) & (lasts > SAME_MOTION * time_unit(orbit))
+    fits = (gaps.max(axis=2) < SAME_SOLUTION) & (lasts > SAME_SOLUTION * time_unit(orbit))
     modes = [whole(mode) for mode, _ in orbit.itinerary]
     wanted = [whole(unit.mode)]
     if unit.half:

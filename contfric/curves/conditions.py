@@ -35,7 +35,7 @@ from contfric.orbit.followed import Followed, followed_values
 from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
 from contfric.orbit.stationary import (
     StationaryPoints,
-    find_behind,
+    find_after_reset,
     find_stationary,
     stationary_workspace,
 )
@@ -124,7 +124,7 @@ def interior_value(way, z):  # type: ignore[no-untyped-def]
     c, n = layout.observables[surface], z.shape[1] - 1
     level_grad, grad, jac = equations.level_grad, equations.grad, equations.jac
     if layout.resets[i] >= 0:
-        found = find_behind(functions, layout, i, c, z, p, equations, stationary)
+        found = find_after_reset(functions, layout, i, c, z, p, equations, stationary)
     else:
         found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
     target = functions.level(surface, p, which, level_grad)

@@ -36,7 +36,7 @@ from contfric.orbit.followed import remember
 from contfric.orbit.monitor import watch
 from contfric.orbit.newton import CHECKS, MULTIPLIERS, off_normal
 from contfric.orbit.spectrum import multipliers
-from contfric.orbit.stationary import find_behind, find_stationary
+from contfric.orbit.stationary import find_after_reset, find_stationary
 from contfric.orbit.system import IntArray
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
@@ -207,7 +207,7 @@ def other_touches(way, row, z):  # type: ignore[no-untyped-def]
     sign = float(layout.interior[row, 2])
     c = layout.observables[surface]
     if layout.resets[i] >= 0:
-        found = find_behind(functions, layout, i, c, z, p, equations, stationary)
+        found = find_after_reset(functions, layout, i, c, z, p, equations, stationary)
     else:
         found = find_stationary(functions, layout, i, c, z, p, equations.last, stationary)
     target = functions.level(surface, p, equations.none, equations.empty)

@@ -84,7 +84,7 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
     return float(begin + times[int(np.argmin(np.abs(values - level)))])
 
 
-def same_place(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
+def same_location(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
     """Tell whether margins of two itineraries for one solution vanish at one place, or its mirror image."""
     time, surface = place_of(one, a)
     there, on = place_of(other, b)
@@ -126,7 +126,7 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
     for test in orbit.system.tests:
         if test.margin is not problem.test.margin:
             continue
-        if same_place(special.orbit, problem.test, orbit, test):
+        if same_location(special.orbit, problem.test, orbit, test):
             kind = kind_of_margin(orbit.system, test, orbit)
             return Bifurcation(kind, orbit.params, orbit, (test,))
     return None
@@ -145,7 +145,7 @@ def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
             there = _tangent_at(other, touch)
         except ParameterError:
             continue
-        if same_place(one, place, other, there):
+        if same_location(one, place, other, there):
             return Bifurcation(Kind.T, other.params, other, (touch,))
     return None
 

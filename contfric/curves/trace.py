@@ -30,7 +30,7 @@ _NO_TIME = 1e-9
 #: Most changes of the signature along one side of a curve: a chain longer than this goes round.
 _MOST_CHANGES = 24
 #: A piece of a curve that is shorter than this is at one place: located events are good to 1e-9 or so.
-_AT_ONE_PLACE = 1e-6
+_AT_ONE_LOCATION = 1e-6
 
 Progress = Callable[[str], None]
 
@@ -182,7 +182,7 @@ def trace_curve_side(
                 raise
             side.end = CurveEnd(CurveEndReason.INTERRUPTED, special=special)
             return side
-        here = [was for was, arc in passed if side.tip.arc - arc < _AT_ONE_PLACE]
+        here = [was for was, arc in passed if side.tip.arc - arc < _AT_ONE_LOCATION]
         if on is not None and not any(_is_same(on[0], was) for was in here):
             other, point, border = on
             point.arc = side.tip.arc

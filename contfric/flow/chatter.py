@@ -133,7 +133,7 @@ def is_left(motion, mode, t, y, p, none, empty):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
-    """Advance (t, y) from after an impact to after the next; return the time between, or -1.
+    """Advance (t, y), just after an impact, to just after the next; return the time between, or -1.
 
     ``slopes`` (1 + n, 1 + n + k), the derivatives of (t, y), are advanced as well, if there are any.
     """
@@ -251,7 +251,7 @@ def write_limit(nodes, count, limit, jac):  # type: ignore[no-untyped-def]
 
 @allocating_helper
 def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-untyped-def]
-    """Write the limit (t*, y*) of the impacts from after one of them; return its error, or -1.
+    """Write the limit (t*, y*) of the impacts that follow one of them; return its error, or -1.
 
     ``jac`` (1 + n, 1 + n + k), if it has space: its derivatives by t0, y0 and the parameters.
     """

@@ -145,7 +145,7 @@ class TransitionMaps(SectionMaps):
         }
         for domain in self.domains:
             for reset in self.resets:
-                behind = self._domains_behind(domain, reset)
+                behind = self._domains_after(domain, reset)
                 if behind and self.maps_at(domain, reset.surface):
                     found[domain.name, reset.surface] = behind
         for own in self.chatters:  # what is one mode may be left to on either side of its section
@@ -196,7 +196,7 @@ class TransitionMaps(SectionMaps):
         """Return whether a reset may change the sign at a surface."""
         return self.surface_by_name[surface].observable in reset.changes
 
-    def _domains_behind(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
+    def _domains_after(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
         """Return the domains that a reset can map to: they differ in what it changes.
 
         Where several modes hold, the one that the reset names goes on, or else the mode before it.

@@ -16,7 +16,7 @@ def apply_reset(functions, layout, i, start, p, which, workspace):  # type: igno
 
 
 @helper
-def behind_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
+def through_reset(jac, reset, row, n):  # type: ignore[no-untyped-def]
     """Make the derivatives of a flow after a reset those with respect to the joint before it."""
     for j in range(n):
         for k in range(n):

@@ -116,8 +116,8 @@ def _parting(trajectory: Trajectory) -> str:
     apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))
     if apart > _CHAOTIC * _APART:
         return (
-            f". Motions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it is "
-            "chaotic, or a long transient of chaos"
+            f". Solutions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it "
+            "is chaotic, or a long transient of chaos"
         )
     return ". Solutions that begin close stay close: it is quasi-periodic, or it converges slowly"
 

@@ -94,7 +94,7 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
 
     Columns of size 1, shapes (n, states).
     """
-    found = motions_in(model, mode)
+    found = sampled_states(model, mode)
     found = [(p, t, y, _without_rounding(rate, y)) for p, t, y, rate in found]
     apart = [y - found[0][2] for _, _, y, _ in found[1:]]
     changes = _columns([rate for *_, rate in found], len(model.states))
@@ -105,7 +105,7 @@ def _along(model: Model, mode: str) -> tuple[FloatArray, FloatArray]:
 
 
 @cache
-def motions_in(model: Model, mode: str) -> list[Motion]:
+def sampled_states(model: Model, mode: str) -> list[Motion]:
     """Return some states of a mode: parameters, time, state and its rate."""
     return _at_random(model, mode) if isinstance(model, ComposedModel) else _at_samples(model, mode)
 

@@ -39,7 +39,7 @@ from contfric.compiled import (
     vector,
 )
 from contfric.models.definition import FloatArray
-from contfric.orbit.after_reset import apply_reset, behind_reset
+from contfric.orbit.after_reset import apply_reset, through_reset
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.short_exits import is_divided, mean_rate_row
 from contfric.orbit.system import Layout
@@ -161,7 +161,7 @@ def segment_jacobian(functions, layout, i, start, duration, p, which, out, works
         apply_reset(functions, layout, i, start, p, which, workspace)
         begin = workspace.behind[n, :n]
         functions.flow(mode, start[0], begin, duration, p, which, state, out)
-        behind_reset(out, workspace.behind, workspace.grad, n)
+        through_reset(out, workspace.behind, workspace.grad, n)
     else:
         functions.flow(mode, start[0], start[1:], duration, p, which, state, out)
 
@@ -223,7 +223,7 @@ def segment_rows(functions, layout, i, at, start, after, p, which, workspace, ro
         begin = workspace.behind[n, :n]
     functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
     if layout.resets[i] >= 0:
-        behind_reset(jac, workspace.behind, grad, n)
+        through_reset(jac, workspace.behind, grad, n)
     worst = 0.0
     for j in range(n):
         row = m + j

@@ -9,7 +9,7 @@ from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
 from contfric.orbit.monitor import start_value
-from contfric.orbit.stationary import find_behind, find_stationary, stationary_workspace
+from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
 
 
 @kernel(types.boolean(FlowType, LayoutType, i8, matrix, vector, vector))
@@ -29,7 +29,7 @@ def extent(functions, layout, c, z, p, out):  # type: ignore[no-untyped-def]
     for i in range(count):
         low, high = min(low, z[i, 1]), max(high, z[i, 1])
         if layout.resets[i] >= 0:
-            found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
+            found = find_after_reset(functions, layout, i, c, z, p, workspace, stationary)
             begin = start_value(functions, layout, i, c, z, p, workspace)
             low, high = min(low, begin), max(high, begin)
         else:

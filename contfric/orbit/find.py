@@ -148,7 +148,7 @@ def _settled(
         if done >= most:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             raise why_none(trajectory, done, slow, compared=longest is None)
-        behind = _behind_creep(trajectory)
+        behind = _after_creep(trajectory)
         if behind is not None:
             time, state = behind
             trajectory = simulated(_MOST_EVENTS_AT_ONCE)
@@ -158,7 +158,7 @@ def _settled(
         trajectory = go_on(trajectory, span * unit, heard)
 
 
-def _behind_creep(trajectory: Trajectory) -> tuple[float, FloatArray] | None:
+def _after_creep(trajectory: Trajectory) -> tuple[float, FloatArray] | None:
     """Return time and state where a motion that creeps to one side will have come to; None if it does not."""
     lag = next((lag for lag, _, _ in recurrences(trajectory)), 0)
     return beyond_creep(trajectory, lag) if lag else None

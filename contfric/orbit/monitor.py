@@ -25,7 +25,7 @@ from contfric.orbit.equations import (
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
-from contfric.orbit.stationary import find_behind, find_stationary, stationary_workspace
+from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
 
 #: An observable this near to a level, relative to 1 + the level, touches it to rounding (ten units in
 #: the last place): it is not labelled as a crossing.
@@ -147,7 +147,7 @@ def margins(functions, layout, z, p, workspace, stationary, out, labels, followe
         i, c = interior[k, 0], observables[interior[k, 1]]
         if i != segment or c != watched:  # surfaces of one observable share its stationary points
             if layout.resets[i] >= 0:
-                found = find_behind(functions, layout, i, c, z, p, workspace, stationary)
+                found = find_after_reset(functions, layout, i, c, z, p, workspace, stationary)
             else:
                 found = find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
             segment, watched = i, c
@@ -279,7 +279,7 @@ def points_of_label(functions, layout, k, z, p, workspace, stationary):  # type:
     """Fill the stationary points of row k of the labels; return their number."""
     i, c = layout.labels[k, 0], layout.labels[k, 1]
     if layout.resets[i] >= 0:
-        return find_behind(functions, layout, i, c, z, p, workspace, stationary)
+        return find_after_reset(functions, layout, i, c, z, p, workspace, stationary)
     return find_stationary(functions, layout, i, c, z, p, workspace.last, stationary)
 
 

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.conserved import conserved, motions_in
+from contfric.orbit.conserved import conserved, sampled_states
 from contfric.orbit.system import Itinerary
 
 #: How well rates are explained by heights, relative to the largest of these: rounding.
@@ -65,7 +65,7 @@ def _explained(model: Model, still: FloatArray, surface: str, modes: tuple[str, 
     """Tell whether the rate of a combination of some functions is the height of a surface in some modes."""
     changes, heights = [], []
     for mode in modes:
-        for vector, t, y, rate in motions_in(model, mode):
+        for vector, t, y, rate in sampled_states(model, mode):
             changes.append(still @ rate)
             heights.append(model.view(vector).height(surface, t, y))
     if not changes:

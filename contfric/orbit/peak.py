@@ -25,7 +25,7 @@ from contfric.orbit.equations import (
     segment_jacobian,
 )
 from contfric.orbit.stationary import (
-    find_behind,
+    find_after_reset,
     find_stationary,
     stationary_workspace,
 )
@@ -130,7 +130,7 @@ def stationary_in(functions, extreme, i, p, own, stationary):  # type: ignore[no
     """Fill the stationary points of segment i of the whole orbit; return their number, -1 if too many."""
     whole, c = extreme.whole, extreme.observable
     if whole.resets[i] >= 0:
-        return find_behind(functions, whole, i, c, own.cycle, p, own.equations, stationary)
+        return find_after_reset(functions, whole, i, c, own.cycle, p, own.equations, stationary)
     return find_stationary(functions, whole, i, c, own.cycle, p, own.equations.last, stationary)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.compiled import helper
-from contfric.orbit.after_reset import apply_reset, behind_reset
+from contfric.orbit.after_reset import apply_reset, through_reset
 
 #: Where a segment that begins on its exit surface is shorter than this (nondimensional), its exit row is
 #: divided by the duration if five points of Gauss are exact there; the row as it stands is well conditioned
@@ -43,7 +43,7 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
         time = share * duration
         if layout.resets[i] >= 0:
             functions.flow(mode, start[0], workspace.behind[n, :n], time, p, which, state, jac)
-            behind_reset(jac, workspace.behind, grad, n)
+            through_reset(jac, workspace.behind, grad, n)
         else:
             functions.flow(mode, start[0], start[1:], time, p, which, state, jac)
         mean += weight * functions.rate(mode, c, start[0] + time, state, p, which, grad)

@@ -15,7 +15,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 
 #: Parts of a cycle that agree to this (nondimensional) are the same solution: the root of rounding.
-SAME_MOTION = 1e-5
+SAME_SOLUTION = 1e-5
 #: Segments shorter than this have no length: a slide that vanishes is located to the third root of rounding
 #: (times its conditioning), a hold at a touch of rest to the second.
 SHORT = 1e-3
@@ -55,7 +55,9 @@ def slides_of(orbit: Orbit) -> list[int]:
     for k, i in enumerate(some):
         before, mode = some[k - 1], orbit.itinerary[i][0]
         gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
-        goes_on = orbit.itinerary[before][0] == mode and np.max(gap) < SAME_MOTION and len(some) > 1
+        goes_on = (
+            orbit.itinerary[before][0] == mode and np.max(gap) < SAME_SOLUTION and len(some) > 1
+        )
         if mode not in sliding and not goes_on:
             found.append(i)
     return found or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]
@@ -76,7 +78,7 @@ def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False)
     if mirrored:
         assert symmetry is not None
         ahead[:, 1:] = ahead[:, 1:] @ symmetry.array().T
-    return bool(np.max(np.abs(ahead - starts)) < SAME_MOTION)
+    return bool(np.max(np.abs(ahead - starts)) < SAME_SOLUTION)
 
 
 def repetitions(orbit: Orbit, slides: list[int]) -> int:
@@ -178,7 +180,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
         k
         for k in range(1, whole.periods + 1)
         if whole.periods % k == 0
-        and np.max(np.abs(np.roll(states, -k, axis=0) - states)) < SAME_MOTION
+        and np.max(np.abs(np.roll(states, -k, axis=0) - states)) < SAME_SOLUTION
     )
     starts = np.column_stack([np.zeros(periods), states[:periods]])
     impacts = _impacts(whole)
@@ -198,7 +200,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
 def _impacts(whole: Orbit) -> FloatArray:
     """Return time and state in front of each reset that changes the state: a grazing impact changes none."""
     behind = np.roll(whole.begins[:, 1:], -1, axis=0)
-    jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_MOTION
+    jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_SOLUTION
     struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.itinerary]
     return np.array(whole.ends[jumps & np.array(struck)])
 

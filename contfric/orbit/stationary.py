@@ -41,7 +41,7 @@ def find_stationary(functions, layout, i, c, z, p, last, stationary):  # type: i
 
 
 @helper
-def find_behind(functions, layout, i, c, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
+def find_after_reset(functions, layout, i, c, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
     """Do the same for a segment after a reset."""
     after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
     duration = after[0] - z[i, 0]

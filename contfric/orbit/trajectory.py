@@ -18,7 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.chatter import FASTER
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.sides import behind_event, mode_after, sign_code
+from contfric.orbit.sides import mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MOST_SURFACES, Tables
@@ -231,7 +231,7 @@ def write_event(rows, event, mode, surface, cycle, t):  # type: ignore[no-untype
 
 
 @helper
-def sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+def sides_after(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
     """Return the sides of all surfaces after an event, by which the mode that follows is known."""
     if tables.flights[mode] >= 0:
         return code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
@@ -240,7 +240,7 @@ def sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace):  #
 
 
 @helper
-def behind_impact(  # type: ignore[no-untyped-def]
+def after_impact(  # type: ignore[no-untyped-def]
     functions, tables, mode, surface, target, t, struck_at, y, p, unit, carry, workspace
 ):
     """Return (whether the wall is pressed from now on, mode of the chatter that begins; -1 if none does).
@@ -308,7 +308,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             copy_state(y, rows.states[event])
             functions.reset(surface, t, rows.states[event], p, none, y, nothing)
         on = tables.landed[surface]
-        code = sides_behind(functions, tables, mode, surface, t, y, p, unit, workspace)
+        code = sides_after(functions, tables, mode, surface, t, y, p, unit, workspace)
         target = mode_after(tables, mode, surface, code)
         if target == -1 and not reset:
             target = mode_together(functions, tables, mode, surface, code, t, y, p, workspace)
@@ -320,7 +320,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             if target == -1:
                 return IMPOSSIBLE, event, mode, cycle, t
             struck_at = rows.states[event]
-            pressed, chatter = behind_impact(
+            pressed, chatter = after_impact(
                 functions, tables, mode, surface, target, t, struck_at, y, p, unit, carry, workspace
             )
         if chatter >= 0:
@@ -333,7 +333,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         write_event(rows, event, mode, surface, cycle, t)
         if not reset:
             copy_state(y, rows.states[event])
-        on = behind_event(tables, mode, surface)
+        on = surfaces_after(tables, mode, surface)
         if tables.flights[mode] >= 0:  # at rest on a wall it may be at rest on a section, too
             on |= lying_on(functions, tables, t, y, p, workspace)
         mode = target

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _SAME = 1e-9
 #: Extrema of the orbits of one event agree to this: an event near a singular point, where a branch is
 #: vertical, is located to about 1e-6.
-_SAME_MOTION = 1e-5
+_SAME_SOLUTION = 1e-5
 #: A diagram with more tangencies than this does not label them; nor does it label the events that lie on
 #: bridges only if there are more of those.
 MOST_TANGENCIES, MOST_ON_BRIDGES = 4, 4
@@ -81,7 +81,7 @@ def _coincide(a: Bifurcation, b: Bifurcation, parameter: str) -> bool:
         return True
     spans = [np.array([o.x_max, o.x_min]) for o in (a.orbit, b.orbit)]
     gaps = (spans[0] - spans[1], spans[0] + spans[1][::-1])
-    return any(bool(np.all(np.abs(gap) <= _SAME_MOTION)) for gap in gaps)
+    return any(bool(np.all(np.abs(gap) <= _SAME_SOLUTION)) for gap in gaps)
 
 
 def _distinct(values: FloatArray) -> FloatArray:

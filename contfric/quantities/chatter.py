@@ -51,7 +51,7 @@ def pieces(segment: Segment, own: Chatter) -> Iterator[Segment]:
 
 
 def _flight(part: Segment, mode: str, wall: str, lasts: float) -> tuple[Segment, Segment]:
-    """Return one flight, and what follows from after the impact that ends it."""
+    """Return one flight, and what follows the impact that ends it."""
     model, vector, n = part.model, part.vector, len(part.state)
     k, end = model.surface_index[wall], part.start + lasts
     gap = model.surface_by_name[wall].observable

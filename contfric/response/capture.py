@@ -21,7 +21,7 @@ from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.sides import (
-    behind_event,
+    surfaces_after,
 )
 from contfric.orbit.trajectory import (
     TablesType,
@@ -106,7 +106,7 @@ def capture(  # type: ignore[no-untyped-def]
             if outcome != ARRIVED:
                 ends[cell] = outcome
                 break
-            on = behind_event(tables, mode, surface)
+            on = surfaces_after(tables, mode, surface)
             mode, cycle = following, cycle + turns
             label = caught(targets, mode * surfaces + surface, t, walk.y, period, timeless)
             if label >= 0:

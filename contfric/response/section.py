@@ -33,7 +33,7 @@ from contfric.compiled import (
 )
 from contfric.flow.layouts import FlowType
 from contfric.orbit.sides import (
-    behind_event,
+    surfaces_after,
 )
 from contfric.orbit.trajectory import (
     ALL_EVENTS,
@@ -74,7 +74,7 @@ _FACTOR, _OFFSET = 6364136223846793005, 1442695040888963407
 
 
 @helper
-def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws):  # type: ignore[no-untyped-def]
+def step_past(functions, tables, mode, surface, following, cycle, t, y, p, ws):  # type: ignore[no-untyped-def]
     """Begin the next segment after a joint."""
     segment, workspace = ws.segment, ws.state
     copy_state(y, ws.found)
@@ -83,7 +83,7 @@ def step_behind(functions, tables, mode, surface, following, cycle, t, y, p, ws)
     else:
         copy_state(ws.found, segment.y)
     segment.at[0], segment.at[2] = following, cycle
-    segment.at[1] = behind_event(tables, mode, surface)
+    segment.at[1] = surfaces_after(tables, mode, surface)
     segment.time[0] = t
 
 
@@ -210,7 +210,7 @@ def cut_solution(  # type: ignore[no-untyped-def]
                 cut_inside(functions, cut, duration, p, period, ws, points)
                 cut_joint(functions, cut, before, surface, at, phase, y, p, ws, points)
             following = rows.joints[e + 1, 0] if e + 1 < count else mode
-            step_behind(functions, tables, before, surface, following, at, phase, y, p, ws)
+            step_past(functions, tables, before, surface, following, at, phase, y, p, ws)
             event += 1
             itinerary = (itinerary + before * surfaces + surface + 1) * _FACTOR + _OFFSET
             if points.number[0] - first >= how.most:

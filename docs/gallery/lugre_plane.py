@@ -31,7 +31,7 @@ SECTIONS = {
 #: Largest step of curves as a share of the ranges, and most points of each side.
 STEP, POINTS = 0.004, 150
 #: An event lies on a curve that crosses its section this near to it, with joints this near to its own.
-SAME_PLACE, SAME_ORBIT = 1e-5, 3e-2
+SAME_LOCATION, SAME_ORBIT = 1e-5, 3e-2
 #: Kinds in the order in which their curves are followed.
 KINDS = (cf.Kind.BP, cf.Kind.SN)
 #: Symmetric orbits between these are left out (five loops of Fig. 18 that are like the first one), and all
@@ -118,7 +118,7 @@ def lies_on(curve: cf.Curve, event: cf.Bifurcation) -> bool:
     on = "Omega" if event.params["Omega"] == SECTIONS["fig17"][2]["Omega"] else "S"
     free = NAMES[1 - NAMES.index(on)]
     for value, k in crossings(curve, on, event.params[on]):
-        if abs(value - event.params[free]) < SAME_PLACE:
+        if abs(value - event.params[free]) < SAME_LOCATION:
             here, there = curve[k].as_whole().joints, event.orbit.as_whole().joints
             if here.shape == there.shape and np.max(np.abs(here - there)) < SAME_ORBIT:
                 return True

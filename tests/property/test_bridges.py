@@ -37,7 +37,7 @@ CHOSEN: dict[str, Scene] = {
     "SS, AS and GS": ({"Omega": 0.5, "S": 0.3, "S0": 0.4, "h": 0.28}, "h", (0.2385, 0.3)),
 }
 #: Ends of one event, in the parameter relative to the range, and in the motion.
-SAME_VALUE, SAME_MOTION = 1e-10, 1e-7
+SAME_VALUE, SAME_SOLUTION = 1e-10, 1e-7
 #: A solution of the inclusion, by simulation from joint to joint.
 MOTION = 1e-9
 #: Where a margin is smaller than this, rounding decides whether another event is met (nondimensional).
@@ -245,7 +245,7 @@ def test_both_ends_of_a_bridge_meet_a_branch(case: int | str) -> None:
                 continue
             accuracy = end.bifurcation.accuracy
             rough = accuracy > ACCURACY
-            values, motion = (accuracy, accuracy**0.5) if rough else (SAME_VALUE, SAME_MOTION)
+            values, motion = (accuracy, accuracy**0.5) if rough else (SAME_VALUE, SAME_SOLUTION)
             met = list(gaps(found, index, side))
             assert any(v <= values and m <= motion for v, m in met), (branch, end, met)
 
@@ -275,7 +275,7 @@ def test_both_sides_of_an_end_are_located_alone(case: str) -> None:
                 met = nearest_end(found, other, bridge[-side])
                 value = abs(met.params[found.parameter] - tip.params[found.parameter])
                 gaps.append((value / (found.range[1] - found.range[0]), apart(met, tip)))
-            assert any(v <= SAME_VALUE and m <= SAME_MOTION for v, m in gaps), (bridge, end, gaps)
+            assert any(v <= SAME_VALUE and m <= SAME_SOLUTION for v, m in gaps), (bridge, end, gaps)
             ends += 1
     assert ends >= 2
 

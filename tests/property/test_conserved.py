@@ -163,7 +163,7 @@ def test_a_motion_that_dies_away_next_to_a_stuck_contact_comes_to_rest() -> None
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_random_stuck_branch_off_the_centre_has_no_loose_end(seed: int) -> None:
-    """Motions near its end may walk to other orbits: it ends there all the same, and the diagram says why."""
+    """Solutions near its end may go to other orbits: it ends there all the same, and the diagram says why."""
     draw = np.random.default_rng([59, seed])
     about = {"W": 1.06, "k": 1.0545, "kt": 2.267, "zeta": 0.01875, "F": 0.86646, "muN": 0.99391}
     params = {name: value * draw.uniform(0.999, 1.001) for name, value in about.items()}
