@@ -11,267 +11,170 @@ Nothing heavy is imported until it is used.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.lazy import lazily
+
 if TYPE_CHECKING:
-    from contfric.atlas.diagram import Diagram
-    from contfric.atlas.explore import explore
-    from contfric.atlas.plane import Plane
-    from contfric.atlas.plane_explore import explore_plane
-    from contfric.atlas.seeds import Seeds
-    from contfric.censuses.census import census
-    from contfric.censuses.result import Census
-    from contfric.certify.census import certify_census
-    from contfric.certify.census_result import CensusCertificate
-    from contfric.chaos.compute import lyapunov_map
-    from contfric.chaos.exponents import LyapunovExponents, lyapunov_exponent
-    from contfric.chaos.map import LyapunovMap
-    from contfric.chaos.status import Motion
-    from contfric.continuation.adding import Window, period_adding
-    from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation, EndReason, Kind
-    from contfric.continuation.trace import continue_orbit
-    from contfric.curves.curve import Curve
-    from contfric.curves.extremum import ExtremumCurve, continue_extremum
-    from contfric.curves.homoclinic import HomoclinicCurve, continue_homoclinic
-    from contfric.curves.quantity_curve import QuantityCurve
-    from contfric.curves.quantity_trace import continue_quantity
-    from contfric.curves.special import CodimTwo
-    from contfric.curves.trace import continue_bifurcation
-    from contfric.ensembles.compute import ensemble
-    from contfric.ensembles.ensemble import Ensemble
-    from contfric.equilibria.branch import EquilibriumBranch
-    from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
-    from contfric.equilibria.explore import EquilibriumDiagram, explore_equilibria
-    from contfric.equilibria.find import find_equilibria
-    from contfric.equilibria.result import Equilibria, Equilibrium, EquilibriumSet
-    from contfric.equilibria.trace import continue_equilibrium
-    from contfric.errors import (
-        AperiodicError,
-        ContfricError,
-        ConvergenceError,
-        ModelError,
-        NotationError,
-        ParameterError,
-        ResultFileError,
-        StudyError,
-    )
-    from contfric.fitting.data import Jump, Measured, Series
-    from contfric.fitting.fit import fit
-    from contfric.fitting.result import Fit
-    from contfric.models import Model, load_model, model_names
-    from contfric.models.check import ModelReport, check_model
-    from contfric.models.mechanism import Mechanism
-    from contfric.models.oscillator import OscillatorModel
-    from contfric.models.two_folds import TwoFold, find_two_folds
-    from contfric.orbit.find import find_orbit
-    from contfric.orbit.gradient import Gradient
-    from contfric.orbit.orbit import Orbit
-    from contfric.orbit.simulation import simulate
-    from contfric.orbit.solve import solve_orbit
-    from contfric.quantities.registry import quantity_names
-    from contfric.response.basin_map import basins
-    from contfric.response.basins import Basins
-    from contfric.response.outcome import Outcome
-    from contfric.response.poincare import poincare
-    from contfric.response.release import release_map
-    from contfric.response.returns import ReleaseMap, Returns
-    from contfric.response.stable_set import StableSet, stable_set
-    from contfric.response.sweep import Sweep
-    from contfric.response.sweeping import sweep
-    from contfric.results import load, save
-    from contfric.results.export import export
-    from contfric.signature import Signature, load_signature, signature_names, transition_graph
-    from contfric.study import run_study
+    from contfric.atlas.diagram import Diagram as Diagram
+    from contfric.atlas.explore import explore as explore
+    from contfric.atlas.plane import Plane as Plane
+    from contfric.atlas.plane_explore import explore_plane as explore_plane
+    from contfric.atlas.seeds import Seeds as Seeds
+    from contfric.censuses.census import census as census
+    from contfric.censuses.result import Census as Census
+    from contfric.certify.census import certify_census as certify_census
+    from contfric.certify.census_result import CensusCertificate as CensusCertificate
+    from contfric.chaos.compute import lyapunov_map as lyapunov_map
+    from contfric.chaos.exponents import LyapunovExponents as LyapunovExponents
+    from contfric.chaos.exponents import lyapunov_exponent as lyapunov_exponent
+    from contfric.chaos.map import LyapunovMap as LyapunovMap
+    from contfric.chaos.status import Motion as Motion
+    from contfric.continuation.adding import Window as Window
+    from contfric.continuation.adding import period_adding as period_adding
+    from contfric.continuation.branch import Branch as Branch
+    from contfric.continuation.events import Bifurcation as Bifurcation
+    from contfric.continuation.events import EndReason as EndReason
+    from contfric.continuation.events import Kind as Kind
+    from contfric.continuation.trace import continue_orbit as continue_orbit
+    from contfric.curves.curve import Curve as Curve
+    from contfric.curves.extremum import ExtremumCurve as ExtremumCurve
+    from contfric.curves.extremum import continue_extremum as continue_extremum
+    from contfric.curves.homoclinic import HomoclinicCurve as HomoclinicCurve
+    from contfric.curves.homoclinic import continue_homoclinic as continue_homoclinic
+    from contfric.curves.quantity_curve import QuantityCurve as QuantityCurve
+    from contfric.curves.quantity_trace import continue_quantity as continue_quantity
+    from contfric.curves.special import CodimTwo as CodimTwo
+    from contfric.curves.trace import continue_bifurcation as continue_bifurcation
+    from contfric.ensembles.compute import ensemble as ensemble
+    from contfric.ensembles.ensemble import Ensemble as Ensemble
+    from contfric.equilibria.branch import EquilibriumBranch as EquilibriumBranch
+    from contfric.equilibria.events import BoundaryPoint as BoundaryPoint
+    from contfric.equilibria.events import EquilibriumEvent as EquilibriumEvent
+    from contfric.equilibria.events import HopfPoint as HopfPoint
+    from contfric.equilibria.explore import EquilibriumDiagram as EquilibriumDiagram
+    from contfric.equilibria.explore import explore_equilibria as explore_equilibria
+    from contfric.equilibria.find import find_equilibria as find_equilibria
+    from contfric.equilibria.result import Equilibria as Equilibria
+    from contfric.equilibria.result import Equilibrium as Equilibrium
+    from contfric.equilibria.result import EquilibriumSet as EquilibriumSet
+    from contfric.equilibria.trace import continue_equilibrium as continue_equilibrium
+    from contfric.errors import AperiodicError as AperiodicError
+    from contfric.errors import ContfricError as ContfricError
+    from contfric.errors import ConvergenceError as ConvergenceError
+    from contfric.errors import ModelError as ModelError
+    from contfric.errors import NotationError as NotationError
+    from contfric.errors import ParameterError as ParameterError
+    from contfric.errors import ResultFileError as ResultFileError
+    from contfric.errors import StudyError as StudyError
+    from contfric.fitting.data import Jump as Jump
+    from contfric.fitting.data import Measured as Measured
+    from contfric.fitting.data import Series as Series
+    from contfric.fitting.fit import fit as fit
+    from contfric.fitting.result import Fit as Fit
+    from contfric.models import Model as Model
+    from contfric.models import load_model as load_model
+    from contfric.models import model_names as model_names
+    from contfric.models.check import ModelReport as ModelReport
+    from contfric.models.check import check_model as check_model
+    from contfric.models.mechanism import Mechanism as Mechanism
+    from contfric.models.oscillator import OscillatorModel as OscillatorModel
+    from contfric.models.two_folds import TwoFold as TwoFold
+    from contfric.models.two_folds import find_two_folds as find_two_folds
+    from contfric.orbit.find import find_orbit as find_orbit
+    from contfric.orbit.gradient import Gradient as Gradient
+    from contfric.orbit.orbit import Orbit as Orbit
+    from contfric.orbit.simulation import simulate as simulate
+    from contfric.orbit.solve import solve_orbit as solve_orbit
+    from contfric.quantities.registry import quantity_names as quantity_names
+    from contfric.response.basin_map import basins as basins
+    from contfric.response.basins import Basins as Basins
+    from contfric.response.outcome import Outcome as Outcome
+    from contfric.response.poincare import poincare as poincare
+    from contfric.response.release import release_map as release_map
+    from contfric.response.returns import ReleaseMap as ReleaseMap
+    from contfric.response.returns import Returns as Returns
+    from contfric.response.stable_set import StableSet as StableSet
+    from contfric.response.stable_set import stable_set as stable_set
+    from contfric.response.sweep import Sweep as Sweep
+    from contfric.response.sweeping import sweep as sweep
+    from contfric.results import load as load
+    from contfric.results import save as save
+    from contfric.results.export import export as export
+    from contfric.signature import Signature as Signature
+    from contfric.signature import load_signature as load_signature
+    from contfric.signature import signature_names as signature_names
+    from contfric.signature import transition_graph as transition_graph
+    from contfric.study import run_study as run_study
 
-#: Where each public name lives; imported at first use.
-_HOMES = {
-    "AperiodicError": "contfric.errors",
-    "Basins": "contfric.response.basins",
-    "Bifurcation": "contfric.continuation.events",
-    "BoundaryPoint": "contfric.equilibria.events",
-    "Branch": "contfric.continuation.branch",
-    "Census": "contfric.censuses.result",
-    "CensusCertificate": "contfric.certify.census_result",
-    "CodimTwo": "contfric.curves.special",
-    "ContfricError": "contfric.errors",
-    "ConvergenceError": "contfric.errors",
-    "Curve": "contfric.curves.curve",
-    "Diagram": "contfric.atlas.diagram",
-    "Fit": "contfric.fitting.result",
-    "Measured": "contfric.fitting.data",
-    "Series": "contfric.fitting.data",
-    "Jump": "contfric.fitting.data",
-    "StableSet": "contfric.response.stable_set",
-    "stable_set": "contfric.response.stable_set",
-    "fit": "contfric.fitting.fit",
-    "EndReason": "contfric.continuation.events",
-    "Ensemble": "contfric.ensembles.ensemble",
-    "ensemble": "contfric.ensembles.compute",
-    "Equilibria": "contfric.equilibria.result",
-    "Equilibrium": "contfric.equilibria.result",
-    "EquilibriumBranch": "contfric.equilibria.branch",
-    "EquilibriumDiagram": "contfric.equilibria.explore",
-    "EquilibriumEvent": "contfric.equilibria.events",
-    "EquilibriumSet": "contfric.equilibria.result",
-    "HopfPoint": "contfric.equilibria.events",
-    "Gradient": "contfric.orbit.gradient",
-    "Kind": "contfric.continuation.events",
-    "LyapunovExponents": "contfric.chaos.exponents",
-    "LyapunovMap": "contfric.chaos.map",
-    "Model": "contfric.models",
-    "ModelError": "contfric.errors",
-    "ModelReport": "contfric.models.check",
-    "Motion": "contfric.chaos.status",
-    "NotationError": "contfric.errors",
-    "Orbit": "contfric.orbit.orbit",
-    "OscillatorModel": "contfric.models.oscillator",
-    "Mechanism": "contfric.models.mechanism",
-    "Outcome": "contfric.response.outcome",
-    "ParameterError": "contfric.errors",
-    "Plane": "contfric.atlas.plane",
-    "ExtremumCurve": "contfric.curves.extremum",
-    "QuantityCurve": "contfric.curves.quantity_curve",
-    "ReleaseMap": "contfric.response.returns",
-    "ResultFileError": "contfric.errors",
-    "Returns": "contfric.response.returns",
-    "Seeds": "contfric.atlas.seeds",
-    "Signature": "contfric.signature",
-    "StudyError": "contfric.errors",
-    "Sweep": "contfric.response.sweep",
-    "TwoFold": "contfric.models.two_folds",
-    "Window": "contfric.continuation.adding",
-    "basins": "contfric.response.basin_map",
-    "census": "contfric.censuses.census",
-    "certify_census": "contfric.certify.census",
-    "check_model": "contfric.models.check",
-    "continue_bifurcation": "contfric.curves.trace",
-    "continue_equilibrium": "contfric.equilibria.trace",
-    "continue_orbit": "contfric.continuation.trace",
-    "explore_equilibria": "contfric.equilibria.explore",
-    "HomoclinicCurve": "contfric.curves.homoclinic",
-    "continue_extremum": "contfric.curves.extremum",
-    "continue_homoclinic": "contfric.curves.homoclinic",
-    "continue_quantity": "contfric.curves.quantity_trace",
-    "export": "contfric.results.export",
-    "explore": "contfric.atlas.explore",
-    "explore_plane": "contfric.atlas.plane_explore",
-    "find_equilibria": "contfric.equilibria.find",
-    "find_two_folds": "contfric.models.two_folds",
-    "find_orbit": "contfric.orbit.find",
-    "load": "contfric.results",
-    "load_model": "contfric.models",
-    "load_signature": "contfric.signature",
-    "lyapunov_exponent": "contfric.chaos.exponents",
-    "lyapunov_map": "contfric.chaos.compute",
-    "model_names": "contfric.models",
-    "period_adding": "contfric.continuation.adding",
-    "poincare": "contfric.response.poincare",
-    "quantity_names": "contfric.quantities.registry",
-    "release_map": "contfric.response.release",
-    "run_study": "contfric.study",
-    "save": "contfric.results",
-    "signature_names": "contfric.signature",
-    "simulate": "contfric.orbit.simulation",
-    "solve_orbit": "contfric.orbit.solve",
-    "sweep": "contfric.response.sweeping",
-    "transition_graph": "contfric.signature",
-}
-
-__all__ = [
-    "AperiodicError",
-    "Basins",
-    "Bifurcation",
-    "BoundaryPoint",
-    "Branch",
-    "Census",
-    "CensusCertificate",
-    "CodimTwo",
-    "ContfricError",
-    "ConvergenceError",
-    "Curve",
-    "Diagram",
-    "EndReason",
-    "Ensemble",
-    "Equilibria",
-    "Equilibrium",
-    "EquilibriumBranch",
-    "EquilibriumDiagram",
-    "EquilibriumEvent",
-    "EquilibriumSet",
-    "ExtremumCurve",
-    "Fit",
-    "Gradient",
-    "HomoclinicCurve",
-    "HopfPoint",
-    "Jump",
-    "Kind",
-    "LyapunovExponents",
-    "LyapunovMap",
-    "Measured",
-    "Mechanism",
-    "Model",
-    "ModelError",
-    "ModelReport",
-    "Motion",
-    "NotationError",
-    "Orbit",
-    "OscillatorModel",
-    "Outcome",
-    "ParameterError",
-    "Plane",
-    "QuantityCurve",
-    "ReleaseMap",
-    "ResultFileError",
-    "Returns",
-    "Seeds",
-    "Series",
-    "Signature",
-    "StableSet",
-    "StudyError",
-    "Sweep",
-    "TwoFold",
-    "Window",
-    "__version__",
-    "basins",
-    "census",
-    "certify_census",
-    "check_model",
-    "continue_bifurcation",
-    "continue_equilibrium",
-    "continue_extremum",
-    "continue_homoclinic",
-    "continue_orbit",
-    "continue_quantity",
-    "ensemble",
-    "explore",
-    "explore_equilibria",
-    "explore_plane",
-    "export",
-    "find_equilibria",
-    "find_orbit",
-    "find_two_folds",
-    "fit",
-    "load",
-    "load_model",
-    "load_signature",
-    "lyapunov_exponent",
-    "lyapunov_map",
-    "model_names",
-    "period_adding",
-    "poincare",
-    "quantity_names",
-    "release_map",
-    "run_study",
-    "save",
-    "signature_names",
-    "simulate",
-    "solve_orbit",
-    "stable_set",
-    "sweep",
-    "transition_graph",
-]
+_names, _find, _ = lazily(
+    __name__,
+    {
+        "atlas.diagram": "Diagram",
+        "atlas.explore": "explore",
+        "atlas.plane": "Plane",
+        "atlas.plane_explore": "explore_plane",
+        "atlas.seeds": "Seeds",
+        "censuses.census": "census",
+        "censuses.result": "Census",
+        "certify.census": "certify_census",
+        "certify.census_result": "CensusCertificate",
+        "chaos.compute": "lyapunov_map",
+        "chaos.exponents": "LyapunovExponents lyapunov_exponent",
+        "chaos.map": "LyapunovMap",
+        "chaos.status": "Motion",
+        "continuation.adding": "Window period_adding",
+        "continuation.branch": "Branch",
+        "continuation.events": "Bifurcation EndReason Kind",
+        "continuation.trace": "continue_orbit",
+        "curves.curve": "Curve",
+        "curves.extremum": "ExtremumCurve continue_extremum",
+        "curves.homoclinic": "HomoclinicCurve continue_homoclinic",
+        "curves.quantity_curve": "QuantityCurve",
+        "curves.quantity_trace": "continue_quantity",
+        "curves.special": "CodimTwo",
+        "curves.trace": "continue_bifurcation",
+        "ensembles.compute": "ensemble",
+        "ensembles.ensemble": "Ensemble",
+        "equilibria.branch": "EquilibriumBranch",
+        "equilibria.events": "BoundaryPoint EquilibriumEvent HopfPoint",
+        "equilibria.explore": "EquilibriumDiagram explore_equilibria",
+        "equilibria.find": "find_equilibria",
+        "equilibria.result": "Equilibria Equilibrium EquilibriumSet",
+        "equilibria.trace": "continue_equilibrium",
+        "errors": "AperiodicError ContfricError ConvergenceError ModelError "
+        "NotationError ParameterError ResultFileError StudyError",
+        "fitting.data": "Jump Measured Series",
+        "fitting.fit": "fit",
+        "fitting.result": "Fit",
+        "models": "Model load_model model_names",
+        "models.check": "ModelReport check_model",
+        "models.mechanism": "Mechanism",
+        "models.oscillator": "OscillatorModel",
+        "models.two_folds": "TwoFold find_two_folds",
+        "orbit.find": "find_orbit",
+        "orbit.gradient": "Gradient",
+        "orbit.orbit": "Orbit",
+        "orbit.simulation": "simulate",
+        "orbit.solve": "solve_orbit",
+        "quantities.registry": "quantity_names",
+        "response.basin_map": "basins",
+        "response.basins": "Basins",
+        "response.outcome": "Outcome",
+        "response.poincare": "poincare",
+        "response.release": "release_map",
+        "response.returns": "ReleaseMap Returns",
+        "response.stable_set": "StableSet stable_set",
+        "response.sweep": "Sweep",
+        "response.sweeping": "sweep",
+        "results": "load save",
+        "results.export": "export",
+        "signature": "Signature load_signature signature_names transition_graph",
+        "study": "run_study",
+    },
+)
+#: All public names; linters take a list without a star in it.
+__all__ = [*_names, "__version__"]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
@@ -279,14 +182,7 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("contfric")
-    if name in _HOMES:
-        from contfric.base.interrupts import held_back
-
-        with held_back():
-            home = import_module(_HOMES[name])
-        globals()[name] = found = getattr(home, name)  # the next look-up costs nothing
-        return found
-    raise AttributeError(f"module 'contfric' has no attribute '{name}'")
+    return _find(name)
 
 
 def __dir__() -> list[str]:

@@ -14,13 +14,7 @@ from contfric.continuation.crossing import Direction
 from contfric.continuation.events import End, EndReason, Kind, Verdict
 from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.switching import (
-    NEARER,
-    Departure,
-    leave_along,
-    null_vector,
-    overshoots,
-)
+from contfric.continuation.switching import NEARER, Departure, leave_along, null_vector, overshoots
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest

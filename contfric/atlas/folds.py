@@ -15,25 +15,14 @@ import numpy as np
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import (
-    first_end,
-    plane_of,
-    settings_for,
-)
+from contfric.atlas.leaving_event import first_end, plane_of, settings_for
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
-from contfric.continuation.events import (
-    EndReason,
-    Kind,
-    Verdict,
-)
+from contfric.continuation.events import EndReason, Kind, Verdict
 from contfric.continuation.points import Point
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.side import first_point
-from contfric.continuation.switching import (
-    NEARER,
-    settings_value,
-)
+from contfric.continuation.switching import NEARER, settings_value
 from contfric.continuation.trace import follow_orbit, trace_side
 from contfric.continuation.vertices import symmetrised
 from contfric.models.definition import FloatArray

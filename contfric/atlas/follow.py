@@ -20,25 +20,14 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
 from contfric.atlas.faults import fault_of
 from contfric.atlas.folds import follow_arms, follow_fold
-from contfric.atlas.leaving_event import (
-    leave_event,
-    leave_singular,
-    settings_for,
-)
+from contfric.atlas.leaving_event import leave_event, leave_singular, settings_for
 from contfric.atlas.matching import SAME_SOLUTION, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
-from contfric.continuation.events import (
-    ACCURACY,
-    TERMINAL,
-    End,
-    EndReason,
-    Kind,
-    Verdict,
-)
+from contfric.continuation.events import ACCURACY, TERMINAL, End, EndReason, Kind, Verdict
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import Settings, next_to

@@ -12,18 +12,10 @@ from contfric.atlas.exploration import Exploration, Progress
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
-from contfric.continuation.events import (
-    ACCURACY,
-    Bifurcation,
-    End,
-    EndReason,
-)
+from contfric.continuation.events import ACCURACY, Bifurcation, End, EndReason
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import (
-    NEARER,
-    settings_value,
-)
+from contfric.continuation.switching import NEARER, settings_value
 from contfric.continuation.trace import trace_side
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space

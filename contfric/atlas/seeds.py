@@ -7,13 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.errors import (
-    AperiodicError,
-    ConvergenceError,
-    ParameterError,
-    shown,
-    whole_number,
-)
+from contfric.errors import AperiodicError, ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit

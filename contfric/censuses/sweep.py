@@ -32,10 +32,7 @@ from contfric.compiled import (
 )
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.sides import (
-    mode_after,
-    sign_code,
-)
+from contfric.orbit.sides import mode_after, sign_code
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import (

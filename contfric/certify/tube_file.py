@@ -22,14 +22,7 @@ from contfric.certify.piece import Piece
 from contfric.continuation.events import TERMINAL, EndReason
 from contfric.models.balls.numbers import working
 from contfric.verify.curve import Box, check_admissible
-from contfric.verify.file import (
-    BITS,
-    CHECKED_MODELS,
-    FORMAT,
-    check_text,
-    events_between,
-    orbits_at,
-)
+from contfric.verify.file import BITS, CHECKED_MODELS, FORMAT, check_text, events_between, orbits_at
 from contfric.verify.motion import Refused, Undecided
 
 if TYPE_CHECKING:

@@ -15,45 +15,21 @@ import numpy as np
 from numba import types
 
 from contfric.chaos.averaging import clear, gather
-from contfric.chaos.cycle import (
-    forget,
-    returned,
-)
-from contfric.chaos.endings import (
-    NO_MOTION,
-    averaged,
-    starts_at_rest,
-    write_nothing,
-)
+from contfric.chaos.cycle import forget, returned
+from contfric.chaos.endings import NO_MOTION, averaged, starts_at_rest, write_nothing
 from contfric.chaos.one_motion import carry_on, carry_through_reset, try_cycle, write_last
 from contfric.chaos.rows import CellRows, Limits, Starting
 from contfric.chaos.starting import start_mode
-from contfric.chaos.tangent import (
-    ARRIVED,
-    seed,
-)
+from contfric.chaos.tangent import ARRIVED, seed
 from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
-from contfric.compiled import (
-    allocating_helper,
-    f8,
-    helper,
-    i8,
-    indices,
-    kernel,
-    matrix,
-)
+from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
 from contfric.compiling.references import by_reference, reference_at, store_at
 from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
-from contfric.orbit.sides import (
-    surfaces_after,
-)
+from contfric.orbit.sides import surfaces_after
 from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import (
-    HOLD_PERIODS,
-    TablesType,
-)
+from contfric.orbit.trajectory import HOLD_PERIODS, TablesType
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)

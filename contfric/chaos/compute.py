@@ -18,15 +18,7 @@ from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
-from contfric.chaos.tiles import (
-    Place,
-    Tile,
-    TileRows,
-    compute_tile,
-    empty_tile,
-    inside,
-    places,
-)
+from contfric.chaos.tiles import Place, Tile, TileRows, compute_tile, empty_tile, inside, places
 from contfric.chaos.work import Work
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
 from contfric.models import ModelSource

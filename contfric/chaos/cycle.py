@@ -34,9 +34,7 @@ from contfric.chaos.tangent import (
 from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.models.definition import FloatArray
 from contfric.orbit.cyclic import dense_solve
-from contfric.orbit.sides import (
-    surfaces_after,
-)
+from contfric.orbit.sides import surfaces_after
 from contfric.orbit.spectrum import spectrum
 from contfric.orbit.system import IntArray
 

@@ -6,12 +6,7 @@ import math
 
 import numpy as np
 
-from contfric.chaos.cycle import (
-    AT_A_POINT,
-    doubt,
-    shortest,
-    solve_cycle,
-)
+from contfric.chaos.cycle import AT_A_POINT, doubt, shortest, solve_cycle
 from contfric.chaos.endings import (
     BROKEN,
     PERIODIC,
@@ -20,20 +15,9 @@ from contfric.chaos.endings import (
     write_equilibrium,
     write_quiet,
 )
-from contfric.chaos.tangent import (
-    ARRIVED,
-    behind,
-    differentiate,
-    orthonormalise,
-    push,
-    to_joint,
-)
-from contfric.compiled import (
-    helper,
-)
-from contfric.orbit.trajectory import (
-    QUIET,
-)
+from contfric.chaos.tangent import ARRIVED, behind, differentiate, orthonormalise, push, to_joint
+from contfric.compiled import helper
+from contfric.orbit.trajectory import QUIET
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only converges never does.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from contfric.compiled import (
-    helper,
-)
+from contfric.compiled import helper
 
 
 @helper

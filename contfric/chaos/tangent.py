@@ -36,10 +36,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
-from contfric.orbit.sides import (
-    mode_after,
-    sign_code,
-)
+from contfric.orbit.sides import mode_after, sign_code
 from contfric.orbit.system import IntArray
 from contfric.orbit.together import mode_together
 from contfric.orbit.trajectory import (

@@ -7,28 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.chaos.averaging import Averages, new_averages
-from contfric.chaos.cycle import (
-    CycleWorkspace,
-    Memory,
-    new_cycle_workspace,
-    new_memory,
-)
-from contfric.chaos.tangent import (
-    Walk,
-    new_walk,
-    state_workspace,
-)
-from contfric.compiled import (
-    allocating_helper,
-    helper,
-    inlined_helper,
-)
+from contfric.chaos.cycle import CycleWorkspace, Memory, new_cycle_workspace, new_memory
+from contfric.chaos.tangent import Walk, new_walk, state_workspace
+from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.references import by_reference, words_of
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
-from contfric.orbit.trajectory import (
-    StateWorkspace,
-)
+from contfric.orbit.trajectory import StateWorkspace
 
 
 class CellWorkspaces(NamedTuple):

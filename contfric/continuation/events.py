@@ -13,11 +13,7 @@ from typing import TYPE_CHECKING
 
 from contfric.base.extras import need_flint
 from contfric.continuation.measured_event import MeasuredEvent
-from contfric.continuation.touching import (
-    chosen_at,
-    entered_at,
-    thrown_at,
-)
+from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit

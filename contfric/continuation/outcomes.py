@@ -52,14 +52,7 @@ from contfric.orbit.slides import time_unit
 from contfric.orbit.starts import signs_at
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
-from contfric.signature.holds import (
-    TOUCH,
-    ends_rest,
-    hold_at,
-    is_hold,
-    left_surface,
-    release_mode,
-)
+from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6

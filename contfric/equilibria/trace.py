@@ -9,12 +9,7 @@ import numpy as np
 from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.boundary import Partner, Unfolding, partner_of
 from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
-from contfric.equilibria.events import (
-    BoundaryPoint,
-    EquilibriumEvent,
-    EquilibriumKind,
-    HopfPoint,
-)
+from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, EquilibriumKind, HopfPoint
 from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.hopf import centre_of
 from contfric.equilibria.march import Crossing, Limits, Run, march

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from contfric.compiled import (
-    kernel,
-    second_signature,
-    stationary_signature,
-    together_signature,
-)
+from contfric.compiled import kernel, second_signature, stationary_signature, together_signature
 
 
 @kernel(second_signature, counts=False)

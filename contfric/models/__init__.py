@@ -8,7 +8,9 @@ the path of a YAML file, the path of a folder of such files, or a function that 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+from contfric.base.lazy import lazily
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -71,11 +73,5 @@ def load_model(model: ModelSource) -> Model:
     return find(model)
 
 
-def __getattr__(name: str) -> Any:
-    if (
-        name == "Model"
-    ):  # the command line asks for the name of the default model and for nothing else
-        from contfric.models.definition import Model
-
-        return Model
-    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+# the command line asks for the name of the default model and for nothing else
+__getattr__ = lazily(__name__, {"definition": "Model"})[1]

@@ -7,13 +7,7 @@ from dataclasses import replace
 from contfric.models.build import GeneratedFlow
 from contfric.models.composed import ComposedModel
 from contfric.models.composition import composition_of
-from contfric.models.derive import (
-    Spread,
-    constraint_of,
-    level_of,
-    stop_surface_of,
-    symmetry_of,
-)
+from contfric.models.derive import Spread, constraint_of, level_of, stop_surface_of, symmetry_of
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler, defaults, floats

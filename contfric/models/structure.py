@@ -13,16 +13,7 @@ import numpy as np
 from contfric.models.contact_ranges import check_ranges
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
 from contfric.models.entries import EntryError, Part, mapping_in
-from contfric.models.matrices import (
-    Mass,
-    Texts,
-    folded,
-    is_zero,
-    mass_of,
-    matrix_of,
-    summed,
-    times,
-)
+from contfric.models.matrices import Mass, Texts, folded, is_zero, mass_of, matrix_of, summed, times
 from contfric.models.shared_loads import Setting, SharedLoads
 from contfric.models.structure_names import COORDINATES, check_names, check_states
 

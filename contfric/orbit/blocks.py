@@ -9,12 +9,7 @@ from numba import types
 
 from contfric.compiled import blocks, helper, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import (
-    LayoutType,
-    close_chain,
-    equation_workspace,
-    segment_rows,
-)
+from contfric.orbit.equations import LayoutType, close_chain, equation_workspace, segment_rows
 from contfric.orbit.holds import NO_PIN
 
 #: Growth along a segment, times the rate at its exit, from which the rates at the joint are no better than

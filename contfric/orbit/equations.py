@@ -28,16 +28,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.compiled import (
-    allocating_helper,
-    f8,
-    helper,
-    i8,
-    indices,
-    matrix,
-    table,
-    vector,
-)
+from contfric.compiled import allocating_helper, f8, helper, i8, indices, matrix, table, vector
 from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset, through_reset
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN

@@ -16,12 +16,7 @@ from contfric.compiled import helper, indices, kernel, matrix, vector
 from contfric.compiling.references import by_reference
 from contfric.flow.layouts import FlowType
 from contfric.orbit.after_reset import apply_reset
-from contfric.orbit.equations import (
-    LayoutType,
-    close_chain,
-    equation_workspace,
-    segment_rows,
-)
+from contfric.orbit.equations import LayoutType, close_chain, equation_workspace, segment_rows
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS

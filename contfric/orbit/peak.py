@@ -24,11 +24,7 @@ from contfric.orbit.equations import (
     equation_workspace,
     segment_jacobian,
 )
-from contfric.orbit.stationary import (
-    find_after_reset,
-    find_stationary,
-    stationary_workspace,
-)
+from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

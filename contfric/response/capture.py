@@ -11,21 +11,13 @@ import math
 
 from numba import types
 
-from contfric.chaos.cells import (
-    StartingType,
-)
-from contfric.chaos.starting import (
-    start_mode,
-)
+from contfric.chaos.cells import StartingType
+from contfric.chaos.starting import start_mode
 from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.sides import (
-    surfaces_after,
-)
-from contfric.orbit.trajectory import (
-    TablesType,
-)
+from contfric.orbit.sides import surfaces_after
+from contfric.orbit.trajectory import TablesType
 from contfric.response.targets import Targets
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)

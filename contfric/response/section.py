@@ -14,27 +14,12 @@ import math
 
 from numba import types
 
-from contfric.chaos.cells import (
-    StartingType,
-)
+from contfric.chaos.cells import StartingType
 from contfric.chaos.cycle import nearest_turn
-from contfric.chaos.starting import (
-    start_mode,
-)
-from contfric.compiled import (
-    f8,
-    helper,
-    i8,
-    indices,
-    kernel,
-    matrix,
-    table,
-    vector,
-)
+from contfric.chaos.starting import start_mode
+from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.sides import (
-    surfaces_after,
-)
+from contfric.orbit.sides import surfaces_after
 from contfric.orbit.trajectory import (
     ALL_EVENTS,
     ALL_TIME,
@@ -48,13 +33,7 @@ from contfric.orbit.trajectory import (
     follow,
 )
 from contfric.response.cuts import BATCH, Cut, Ends, Following, Points
-from contfric.response.cutting import (
-    MEMORIES,
-    cut_inside,
-    cut_joint,
-    new_workspace,
-    set_strobe,
-)
+from contfric.response.cutting import MEMORIES, cut_inside, cut_joint, new_workspace, set_strobe
 
 CutType = types.NamedTuple([table, indices, i8, i8, f8, i8], Cut)
 FollowingType = types.NamedTuple([f8, f8, f8, i8, i8], Following)

@@ -17,13 +17,7 @@ from contfric.chaos.running import Progress, Timer, check_executor, compute_chai
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import inside
 from contfric.chaos.work import kept_rows
-from contfric.errors import (
-    ParameterError,
-    function_of,
-    mapping_of,
-    real_number,
-    shown,
-)
+from contfric.errors import ParameterError, function_of, mapping_of, real_number, shown
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied

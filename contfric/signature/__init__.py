@@ -6,9 +6,9 @@ and networkx when the graph is built.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from contfric.base.lazy import lazily
 from contfric.signature.edits import double, is_closed_walk, swap_stop, swap_stops
 from contfric.signature.graph import crossing, successors, transition_graph
 from contfric.signature.library import signature_names, signature_path
@@ -54,10 +54,4 @@ __all__ = [
     "transition_graph",
 ]
 
-_NEED_PYDANTIC = ("SignatureFile", "SignatureLike", "load_signature")
-
-
-def __getattr__(name: str) -> Any:
-    if name in _NEED_PYDANTIC:
-        return getattr(import_module("contfric.signature.schema"), name)
-    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+__getattr__ = lazily(__name__, {"schema": "SignatureFile SignatureLike load_signature"})[1]

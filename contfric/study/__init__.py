@@ -5,42 +5,28 @@ Importing this package is cheap: YAML, pydantic and the engine are imported when
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from contfric.base.lazy import lazily
 
 if TYPE_CHECKING:
-    from contfric.study.library import study_names, study_path
-    from contfric.study.plan import Plan, make_plan
-    from contfric.study.read import Study, read_study
-    from contfric.study.result import StudyResult, UnwrittenError
-    from contfric.study.run import run_study
+    from contfric.study.library import study_names as study_names
+    from contfric.study.library import study_path as study_path
+    from contfric.study.plan import Plan as Plan
+    from contfric.study.plan import make_plan as make_plan
+    from contfric.study.read import Study as Study
+    from contfric.study.read import read_study as read_study
+    from contfric.study.result import StudyResult as StudyResult
+    from contfric.study.result import UnwrittenError as UnwrittenError
+    from contfric.study.run import run_study as run_study
 
-_HOMES = {
-    "Plan": "contfric.study.plan",
-    "Study": "contfric.study.read",
-    "StudyResult": "contfric.study.result",
-    "UnwrittenError": "contfric.study.result",
-    "make_plan": "contfric.study.plan",
-    "read_study": "contfric.study.read",
-    "run_study": "contfric.study.run",
-    "study_names": "contfric.study.library",
-    "study_path": "contfric.study.library",
-}
-
-__all__ = [
-    "Plan",
-    "Study",
-    "StudyResult",
-    "UnwrittenError",
-    "make_plan",
-    "read_study",
-    "run_study",
-    "study_names",
-    "study_path",
-]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+__all__, __getattr__, __dir__ = lazily(
+    __name__,
+    {
+        "library": "study_names study_path",
+        "plan": "Plan make_plan",
+        "read": "Study read_study",
+        "result": "StudyResult UnwrittenError",
+        "run": "run_study",
+    },
+)

@@ -25,14 +25,7 @@ from contfric.flow.linear.search import (
 )
 from contfric.flow.linear.sighted import advance_seen, sight_of, write_seen
 from contfric.flow.linear.steps import SMALL
-from contfric.flow.linear.system import (
-    REACH,
-    TERMS,
-    WAVES,
-    rows_of,
-    system_in,
-    terms_for,
-)
+from contfric.flow.linear.system import REACH, TERMS, WAVES, rows_of, system_in, terms_for
 
 #: Error of a stationary time, relative to 1 + the time: one within it of a joint is at the joint.
 _AT_JOINT = 4e-10
