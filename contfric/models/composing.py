@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from contfric.models.build import GeneratedFlow
 from contfric.models.composed import ComposedModel
 from contfric.models.composition import composition_of
-from contfric.models.derive import Spread, constraint_of, level_of, stop_surface_of, symmetry_of
+from contfric.models.derive import as_described, level_of
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.measuring import displacement_of, extrema_at_joints
 from contfric.models.not_affine import NotAffineError
 from contfric.models.regions import ordered_surfaces
 
@@ -43,29 +41,9 @@ def composed_from(description: Description) -> ComposedModel:
     ]
     quiet = description.modes[0].name
     return ComposedModel(
-        name=description.name,
-        title=description.title or description.name,
-        states=description.states,
-        parameters=description.parameters,
-        constraints=tuple(
-            constraint_of(("constraints", i), text, why, params)
-            for i, (text, why) in enumerate(description.constraints)
-        ),
-        observables=description.observables,
-        surfaces=tuple(surfaces),
+        **as_described(description, sampler, surfaces),
         modes=(composition.mode(quiet),),
         domains=(composition.domain(quiet),),
         departures=(),
-        symmetry=symmetry_of(sampler, surfaces),
-        stop_surface=description.stop_surface or stop_surface_of(sampler),
-        displacement="" if extrema_at_joints(sampler, surfaces) else displacement_of(description),
-        flow_factory=GeneratedFlow(description.motion),
-        spread=Spread(description.spread, description.text),
-        references=description.references,
-        autonomous=not description.period,
         filippov=composition.leaves_at_rest,
-        max_step=description.max_step,
-        quantities=description.quantities,
-        units=description.units,
-        definition=description.text,
     )

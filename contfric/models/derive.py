@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -87,36 +88,16 @@ def model_from(description: Description) -> Model:
     domains = join_domains(declared, joined_modes(description))
     surfaces = clear_surfaces(surfaces, domains)
     model = Model(
-        name=description.name,
-        title=description.title or description.name,
-        states=description.states,
-        parameters=description.parameters,
-        constraints=tuple(
-            constraint_of(("constraints", i), text, why, params)
-            for i, (text, why) in enumerate(description.constraints)
-        ),
-        observables=description.observables,
-        surfaces=tuple(surfaces),
+        **as_described(description, sampler, surfaces),
         modes=tuple(_mode(description, m.name) for m in description.modes),
         domains=domains,
         departures=departures,
-        symmetry=symmetry_of(sampler, surfaces),
-        stop_surface=description.stop_surface or stop_surface_of(sampler),
-        displacement="" if extrema_at_joints(sampler, surfaces) else displacement_of(description),
-        flow_factory=GeneratedFlow(description.motion),
-        spread=Spread(description.spread, description.text),
-        references=description.references,
         resets=tuple(reset_of(sampler, name, asked, flights) for name in description.resets),
         chatters=description.chatters,
-        autonomous=not description.period,
         kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, flights),
         turned=turned_modes(sampler, surfaces, declared),
-        max_step=description.max_step,
-        quantities=description.quantities,
-        units=description.units,
         phase=description.phase,
-        definition=description.text,
     )
     for domain, surface, modes in model.undecided():
         if not _meets(sampler, domain, surface):
@@ -128,6 +109,37 @@ def model_from(description: Description) -> Model:
             f"'to: {modes[0]}'",
         )
     return model
+
+
+def as_described(
+    description: Description, sampler: Sampler, surfaces: Sequence[Surface]
+) -> dict[str, Any]:
+    """Return the parts of a model, by their names, that no mode of it is needed for."""
+    return {
+        "name": description.name,
+        "title": description.title or description.name,
+        "states": description.states,
+        "parameters": description.parameters,
+        "constraints": tuple(
+            constraint_of(("constraints", i), text, why, sampler.params)
+            for i, (text, why) in enumerate(description.constraints)
+        ),
+        "observables": description.observables,
+        "surfaces": tuple(surfaces),
+        "symmetry": symmetry_of(sampler, surfaces),
+        "stop_surface": description.stop_surface or stop_surface_of(sampler),
+        "displacement": ""
+        if extrema_at_joints(sampler, surfaces)
+        else displacement_of(description),
+        "flow_factory": GeneratedFlow(description.motion),
+        "spread": Spread(description.spread, description.text),
+        "references": description.references,
+        "autonomous": not description.period,
+        "max_step": description.max_step,
+        "quantities": description.quantities,
+        "units": description.units,
+        "definition": description.text,
+    }
 
 
 def _meets(sampler: Sampler, domain: Domain, surface: str) -> bool:

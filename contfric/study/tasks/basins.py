@@ -10,22 +10,11 @@ from pydantic import Field
 
 from contfric.base.shown import aligned
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import (
-    FigureKind,
-    Job,
-    attempt,
-    axes_text,
-    check_axis,
-    grid_text,
-    incomplete,
-)
+from contfric.study.tasks.task import Asked, FigureKind, Job, axes_text, grid_text, incomplete
 
 if TYPE_CHECKING:
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.response.basins import Basins
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class BasinsTask(Response):
@@ -50,16 +39,14 @@ class BasinsTask(Response):
         None, ge=1, description="a whole number >= 1: periods that a start is followed"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the axes, and that every state has a value."""
         from contfric.response.basin_map import check_starts
 
         for name, values in self.grid.items():
-            if name in model.states:
-                check_axis(located, (self.name, "grid", name), name, values)
-        attempt(located, (self.name,), lambda: check_starts(model, self._axes(), self.at))
+            if name in asked.model.states:
+                asked.check_axis((self.name, "grid", name), name, values)
+        asked.attempt((self.name,), lambda: check_starts(asked.model, self._axes(), self.at))
 
     def _axes(self) -> dict[str, Any]:
         return {

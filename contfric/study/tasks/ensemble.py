@@ -12,16 +12,13 @@ from contfric.base.shown import aligned
 from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
+from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Job, incomplete
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.ensembles.ensemble import Ensemble
-    from contfric.models.definition import Model
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 #: Events and classes that the summary lists; the record has all of them.
 _MOST = 12
@@ -57,27 +54,27 @@ class EnsembleTask(Response):
     max_points: int | None = Field(None, ge=1, description="a whole number >= 1")
     workers: int | None = Field(None, ge=1, description="a whole number >= 1: processes")
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the range, the distributions and the quantity."""
         from contfric.ensembles.drawing import checked_distributions
         from contfric.quantities.registry import number_quantity
 
         steps = {
-            "parameter": lambda: model.index_of(self.parameter),
+            "parameter": lambda: asked.model.index_of(self.parameter),
             "range": lambda: checked_range(self.parameter, self.range),
             "distributions": lambda: checked_distributions(
-                model, self._distributions(), self.parameter
+                asked.model, self._distributions(), self.parameter
             ),
-            "row": lambda: self.row is None or number_quantity(self.row, model, "an ensemble"),
+            "row": lambda: (
+                self.row is None or number_quantity(self.row, asked.model, "an ensemble")
+            ),
         }
         for key, step in steps.items():
-            attempt(located, (self.name, key), step)
+            asked.attempt((self.name, key), step)
         low, high = self.range
-        start = content.params.get(self.parameter)
+        start = asked.content.params.get(self.parameter)
         if isinstance(start, int | float) and not low <= start <= high:
-            located.fail(
+            asked.fail(
                 (self.name, "range"),
                 f"an orbit to begin with is looked for at {self.parameter} = {start:g} of 'params', which is "
                 f"not between {low:g} and {high:g}",

@@ -11,15 +11,12 @@ from contfric.base.shown import aligned
 from contfric.errors import checked_range
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, attempt, incomplete
+from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Job, incomplete
 
 if TYPE_CHECKING:
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.equilibria.events import EquilibriumEvent
     from contfric.equilibria.explore import EquilibriumDiagram
-    from contfric.models.definition import Model
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class EquilibriaTask(Response):
@@ -49,15 +46,13 @@ class EquilibriaTask(Response):
         description="a number in (0, 1]: largest step, as a share of the range",
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the parameter, its range, and that the model has formulas."""
-        attempt(located, (self.name, "parameter"), lambda: model.index_of(self.parameter))
-        attempt(located, (self.name, "range"), lambda: checked_range(self.parameter, self.range))
-        if not model.definition:
-            text = f"equilibria are found from formulas, and '{model.name}' is not declared by formulas"
-            located.fail((self.name,), text)
+        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
+        asked.attempt((self.name, "range"), lambda: checked_range(self.parameter, self.range))
+        if not asked.model.definition:
+            text = f"equilibria are found from formulas, and '{asked.model.name}' is not declared by formulas"
+            asked.fail((self.name,), text)
 
     def does(self, study: Study) -> str:
         """Return the range in words."""

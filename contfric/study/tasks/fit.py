@@ -13,17 +13,14 @@ from contfric.base.yaml_schema import Part, keys_of
 from contfric.errors import ParameterError, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Job, attempt
+from contfric.study.tasks.task import Asked, FigureKind, Job
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.fitting.condition import Datum
     from contfric.fitting.result import Fit
-    from contfric.models.definition import Model
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 FITTED, RESIDUALS = "fit.csv", "residuals.csv"
 
@@ -107,26 +104,28 @@ class FitTask(Response):
         min_length=1, description=f"a list of measurements, each {keys_of(DatumPart)}"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the measurements, but for events, which are not known yet."""
         from contfric.fitting.fit import check_fit
 
         known: list[Datum] = []
         for k, part in enumerate(self.data):
             if part.jump is None:
-                step = partial(lambda p: known.append(p.datum(located.path.parent, None)), part)
+                step = partial(
+                    lambda p: known.append(p.datum(asked.located.path.parent, None)), part
+                )
             else:
                 step = partial(part.checked)
-                if content.task is None:
+                if asked.content.task is None:
                     text = "a jump is an event of a diagram: add 'explore' or 'continue'"
-                    located.fail((self.name, "data", k), text)
-            attempt(located, (self.name, "data", k), step)
+                    asked.fail((self.name, "data", k), text)
+            asked.attempt((self.name, "data", k), step)
         for name in self.free:
-            attempt(located, (self.name, "free"), partial(model.index_of, name))
+            asked.attempt((self.name, "free"), partial(asked.model.index_of, name))
         if known:
-            attempt(located, (self.name,), lambda: check_fit(model, known, params, self.free))
+            asked.attempt(
+                (self.name,), lambda: check_fit(asked.model, known, asked.params, self.free)
+            )
 
     def does(self, study: Study) -> str:
         """Return what is found, in words."""

@@ -11,14 +11,12 @@ from pydantic import Field
 
 from contfric.study.tasks.task import (
     STATE,
+    Asked,
     FigureKind,
     Found,
     Job,
     Task,
-    attempt,
     axes_text,
-    check_axis,
-    check_state,
     grid_text,
     incomplete,
 )
@@ -26,12 +24,9 @@ from contfric.study.tasks.task import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.chaos.map import LyapunovMap
-    from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class LyapunovTask(Task):
@@ -66,20 +61,18 @@ class LyapunovTask(Task):
     )
     state: list[float] | None = Field(None, description=f"{STATE}: where every trajectory starts")
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the axes, the state, and whether the map fits into memory."""
         from contfric.chaos.compute import check_size
 
-        check_state(located, (self.name, "state"), self.state, model)
+        asked.check_state((self.name, "state"), self.state)
         for name, values in self.grid.items():
             address = (self.name, "grid", name)
-            attempt(located, address, partial(model.index_of, name))
-            check_axis(located, address, name, values)
+            asked.attempt(address, partial(asked.model.index_of, name))
+            asked.check_axis(address, name, values)
         shape = tuple(int(values[2]) for values in self.grid.values())
-        size = partial(check_size, shape, self.starts or 1, len(model.states))
-        attempt(located, (self.name, "grid"), size)
+        size = partial(check_size, shape, self.starts or 1, len(asked.model.states))
+        asked.attempt((self.name, "grid"), size)
 
     def does(self, study: Study) -> str:
         """Return the grid in words."""

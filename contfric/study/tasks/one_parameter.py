@@ -10,7 +10,7 @@ from pydantic import Field
 from contfric.study.tables import Table, points
 from contfric.study.tasks.diagram_record import entries_of, lines_of
 from contfric.study.tasks.orbit import POINTS, points_text
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Found, Task, attempt
+from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Found, Task
 from contfric.study.wanted import Want, row_name
 
 if TYPE_CHECKING:
@@ -18,12 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from contfric.atlas.diagram import Diagram
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.models.definition import Model
     from contfric.response.sweep import Sweep
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 BIFURCATIONS = "bifurcations.csv"
 #: Rows of a diagram that show a state, which an equilibrium has, too.
@@ -64,14 +62,12 @@ class OneParameter(Task):
         """The ends of the range."""
         return self.range[0], self.range[1]
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the parameter, and its range against the start and the model."""
-        attempt(located, (self.name, "parameter"), lambda: model.index_of(self.parameter))
-        fault = _range_fault(model, params, self)
+        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
+        fault = _range_fault(asked.model, asked.params, self)
         if fault is not None:
-            located.fail((self.name, "range"), fault)
+            asked.fail((self.name, "range"), fault)
 
     def where(self, study: Study, *more: str) -> str:
         """Return the range, where branches end, and what is computed with them, in words."""

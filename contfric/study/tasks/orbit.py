@@ -9,18 +9,15 @@ from pydantic import Field
 
 from contfric.base.yaml_schema import Part, keys_of
 from contfric.study.tables import Table, points
-from contfric.study.tasks.task import STATE, FigureKind, Found, Job, Skipped, Task, check_state
+from contfric.study.tasks.task import STATE, Asked, FigureKind, Found, Job, Skipped, Task
 from contfric.study.wanted import COLUMNS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.orbit.orbit import Orbit
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 POINTS = "points.csv"
 
@@ -52,16 +49,14 @@ class Start(Task):
     )
     orbit: str | None = Field(None, min_length=1, description="the path of a saved orbit (.npz)")
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Refuse two origins, and a state of another model."""
         given = [k for k in ("simulate", "signature", "orbit") if getattr(self, k) is not None]
         if len(given) != 1:
             got = " and ".join(given) or "none of them"
-            located.fail(("start",), f"'start' has one of simulate, signature, orbit; got {got}")
+            asked.fail(("start",), f"'start' has one of simulate, signature, orbit; got {got}")
         state = self.simulate.state if self.simulate else None
-        check_state(located, ("start", "simulate", "state"), state, model)
+        asked.check_state(("start", "simulate", "state"), state)
 
     def does(self, study: Study) -> str:
         """Return the origin of the orbit, in words."""

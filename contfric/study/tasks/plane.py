@@ -10,17 +10,14 @@ from pydantic import Field
 from contfric.base.yaml_schema import keys_of
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
-from contfric.study.tasks.task import FigureKind, Found, Job, Seeds, Task, attempt
+from contfric.study.tasks.task import Asked, FigureKind, Found, Job, Seeds, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from contfric.atlas.plane import Plane
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 CURVES, SPECIAL, REGIONS = "curves.csv", "special.csv", "regions.csv"
 
@@ -68,9 +65,7 @@ class PlaneTask(Task):
         None, ge=1, description="a whole number >= 1: most sections, those of the study among them"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check ranges, sections and kinds."""
         from contfric.continuation.events import Kind
         from contfric.curves.ranges import box_of
@@ -80,25 +75,25 @@ class PlaneTask(Task):
         wrong = next((name for name, pair in self.range.items() if len(pair) != 2), None)
         if wrong is not None:
             text = f"the range of '{wrong}' is two numbers [low, high]"
-            located.fail(("plane", "range", wrong), text)
-        attempt(located, ("plane",), lambda: box_of(model, (one, other), ranges))
-        self._check_sections(located, ranges)
+            asked.fail(("plane", "range", wrong), text)
+        asked.attempt(("plane",), lambda: box_of(asked.model, (one, other), ranges))
+        self._check_sections(asked, ranges)
         known = [kind.value for kind in Kind if kind is not Kind.NS]
         for kind in self.kinds or []:
             if kind not in known:
                 text = f"no curves of '{kind}'{did_you_mean(kind, known)}"
-                located.fail(("plane", "kinds"), text)
+                asked.fail(("plane", "kinds"), text)
 
-    def _check_sections(self, located: LocatedYaml, ranges: dict[str, tuple[float, float]]) -> None:
+    def _check_sections(self, asked: Asked, ranges: dict[str, tuple[float, float]]) -> None:
         for name, values in (self.sections or {}).items():
             if name not in ranges:
                 text = f"'{name}' is not one of the two parameters{did_you_mean(name, ranges)}"
-                located.fail(("plane", "sections"), text)
+                asked.fail(("plane", "sections"), text)
             low, high = ranges[name]
             for value in values:
                 if not low <= value <= high:
                     text = f"the section {name} = {value:g} is outside of its range [{low:g}, {high:g}]"
-                    located.fail(("plane", "sections", name), text)
+                    asked.fail(("plane", "sections", name), text)
 
     def does(self, study: Study) -> str:
         """Return the curves in words."""

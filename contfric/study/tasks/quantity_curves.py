@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Found, Job, attempt
+from contfric.study.tasks.task import Asked, FigureKind, Found, Job
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.base.yaml_lines import LocatedYaml
     from contfric.curves.quantity_curve import QuantityCurve
-    from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class QuantityCurveTask(Response):
@@ -45,26 +42,23 @@ class QuantityCurveTask(Response):
         None, ge=2, description="a whole number >= 2: most points of each side"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the quantity, the parameters and their ranges."""
         from contfric.curves.ranges import ranges_of
         from contfric.quantities.registry import number_quantity
 
-        attempt(
-            located,
+        asked.attempt(
             (self.name, "quantity"),
-            lambda: number_quantity(self.quantity, model, "a curve"),
+            lambda: number_quantity(self.quantity, asked.model, "a curve"),
         )
         for name, pair in self.range.items():
             if len(pair) != 2:
-                located.fail(
+                asked.fail(
                     (self.name, "range", name),
                     f"the range of '{name}' is two numbers [low, high]",
                 )
-        attempt(
-            located, (self.name,), lambda: ranges_of(model, tuple(self.parameters), self._ranges())
+        asked.attempt(
+            (self.name,), lambda: ranges_of(asked.model, tuple(self.parameters), self._ranges())
         )
 
     def _ranges(self) -> dict[str, tuple[float, float]]:

@@ -9,14 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Job, attempt
+from contfric.study.tasks.task import Asked, FigureKind, Job
 
 if TYPE_CHECKING:
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.response.returns import ReleaseMap
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class ReleaseMapTask(Response):
@@ -36,13 +33,11 @@ class ReleaseMapTask(Response):
         None, gt=0.0, description="a number > 0: periods within which the next release has to come"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check that releases of the model are told by their phase, and the surface."""
         from contfric.response.release import release_of
 
-        attempt(located, (self.name,), lambda: release_of(model, self.surface))
+        asked.attempt((self.name,), lambda: release_of(asked.model, self.surface))
 
     def does(self, study: Study) -> str:
         """Return the map in words."""

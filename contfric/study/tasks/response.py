@@ -7,15 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from contfric.study.tasks.task import STATE, Found, Task, attempt, check_state
+from contfric.study.tasks.task import STATE, Asked, Found, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
-    from contfric.study.schema import StudyFile
 
 
 class Sense(str, Enum):
@@ -58,13 +55,14 @@ class Section(Response):
         None, ge=0.0, description="a number >= 0: periods before points are collected"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the state and the section."""
         from contfric.response.sections import section_of, usual_section
 
-        check_state(located, (self.name, "state"), self.state, model)
+        asked.check_state((self.name, "state"), self.state)
         given: dict[str, Any] = self.options()
-        section, sense = given.get("section", usual_section(model)), given.get("sense", "either")
-        attempt(located, (self.name, "section"), lambda: section_of(model, section, sense))
+        section, sense = (
+            given.get("section", usual_section(asked.model)),
+            given.get("sense", "either"),
+        )
+        asked.attempt((self.name, "section"), lambda: section_of(asked.model, section, sense))

@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Found, Job, attempt
+from contfric.study.tasks.task import Asked, FigureKind, Found, Job
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.response.stable_set import StableSet
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class StableSetTask(Response):
@@ -43,13 +40,11 @@ class StableSetTask(Response):
         None, ge=2, description="a whole number >= 2: most points of each half"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check the model and the ranges."""
         from contfric.response.stable_set import check_ranges
 
-        attempt(located, (self.name,), lambda: check_ranges(model, self.range))
+        asked.attempt((self.name,), lambda: check_ranges(asked.model, self.range))
 
     def does(self, study: Study) -> str:
         """Return what is followed, in words."""

@@ -10,14 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from contfric.study.tasks.response import Section
-from contfric.study.tasks.task import PARAMETER, FigureKind, Job, attempt, check_axis, incomplete
+from contfric.study.tasks.task import PARAMETER, Asked, FigureKind, Job, incomplete
 
 if TYPE_CHECKING:
-    from contfric.base.yaml_lines import LocatedYaml
-    from contfric.models.definition import Model
     from contfric.response.sweep import Sweep
     from contfric.study.read import Study
-    from contfric.study.schema import StudyFile
 
 
 class SweepDirection(str, Enum):
@@ -46,13 +43,11 @@ class SweepTask(Section):
         None, description="one of both, up, down"
     )
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check state, section, parameter and values."""
-        super().check(located, content, model, params)
-        attempt(located, (self.name, "parameter"), lambda: model.index_of(self.parameter))
-        check_axis(located, (self.name, "values"), self.parameter, self.values)
+        super().check(asked)
+        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
+        asked.check_axis((self.name, "values"), self.parameter, self.values)
 
     def does(self, study: Study) -> str:
         """Return the sweep in words."""

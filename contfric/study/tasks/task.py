@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn, TypeAlias
 
 from pydantic import Field
 
@@ -76,6 +76,54 @@ class Job:
         return lambda text: self.say(f"{name}: {text}")
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a task is checked against while a study is read.
+
+    Attributes
+    ----------
+    located : the file with the lines of its entries, for mistakes
+    content : all that the file says
+    model, params : the model, and its parameters at the start
+    """
+
+    located: LocatedYaml
+    content: StudyFile
+    model: Model
+    params: dict[str, float]
+
+    def fail(self, address: Address, text: str) -> NoReturn:
+        """Say what is wrong with an entry."""
+        self.located.fail(address, text)
+
+    def attempt(self, address: Address, step: Callable[[], object]) -> None:
+        """Take a step of which an error of the input belongs to an entry of the file."""
+        try:
+            step()
+        except ContfricError as error:
+            self.fail(address, str(error))
+
+    def check_state(self, address: Address, state: list[float] | None) -> None:
+        """Check the number of states, if there are any."""
+        names = self.model.states
+        if state is not None and len(state) != len(names):
+            self.fail(
+                address,
+                f"a state of '{self.model.name}' is {len(names)} numbers ({', '.join(names)}), got "
+                f"{len(state)}",
+            )
+
+    def check_axis(self, address: Address, name: str, values: list[float]) -> None:
+        """Check the values [low, high, number] of a parameter or of a state."""
+        fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
+        if not fits or values[2] != int(values[2]):
+            self.fail(
+                address,
+                f"the values of {name} are [low, high, number of values], with low < high and a whole "
+                f"number of at least 2, got {values}",
+            )
+
+
 class Task(Part):
     """One task; see the module.
 
@@ -109,9 +157,7 @@ class Task(Part):
 
     # ------------------------------------------------------------------------------ reading, plan
 
-    def check(
-        self, located: LocatedYaml, content: StudyFile, model: Model, params: dict[str, float]
-    ) -> None:
+    def check(self, asked: Asked) -> None:
         """Check what the schema cannot know; a mistake fails with its line."""
 
     def does(self, study: Study) -> str:
@@ -194,40 +240,6 @@ class Seeds(Part):
         from contfric.atlas.seeds import Seeds as Simulations
 
         return {"seeds": Simulations(**self.model_dump())}
-
-
-# ----------------------------------------------------------------- checks that several tasks have
-
-
-def attempt(located: LocatedYaml, address: Address, step: Callable[[], object]) -> None:
-    """Take a step of which an error of the input belongs to an entry of the file."""
-    try:
-        step()
-    except ContfricError as error:
-        located.fail(address, str(error))
-
-
-def check_state(
-    located: LocatedYaml, address: Address, state: list[float] | None, model: Model
-) -> None:
-    """Check the number of states, if there are any."""
-    if state is not None and len(state) != len(model.states):
-        located.fail(
-            address,
-            f"a state of '{model.name}' is {len(model.states)} numbers "
-            f"({', '.join(model.states)}), got {len(state)}",
-        )
-
-
-def check_axis(located: LocatedYaml, address: Address, name: str, values: list[float]) -> None:
-    """Check the values [low, high, number] of a parameter or of a state."""
-    fits = len(values) == 3 and values[0] < values[1] and values[2] >= 2
-    if not fits or values[2] != int(values[2]):
-        located.fail(
-            address,
-            f"the values of {name} are [low, high, number of values], with low < high and a whole "
-            f"number of at least 2, got {values}",
-        )
 
 
 def axes_text(grid: Mapping[str, list[float]]) -> str:
