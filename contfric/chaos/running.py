@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    CancelledError,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    as_completed,
-    wait,
-)
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from functools import partial
+from queue import SimpleQueue
 from time import monotonic
 from typing import Any, TypeAlias, TypeVar
 
@@ -53,151 +48,95 @@ def check_executor(executor: object) -> None:
 
 
 def compute_all(
-    tiles: Mapping[int, T],
+    tasks: Mapping[K, T],
     executor: Executor | None,
     say: Progress,
     compute: Compute,
     threads: int | None = None,
-) -> Iterator[tuple[int, Any]]:
-    """Yield (number, rows) of each tile as it is finished.
+    following: Callable[[K, Any], T | None] = lambda name, rows: None,
+) -> Iterator[tuple[K, Any]]:
+    """Yield (name, rows) of each task as it is finished.
 
     Parameters
     ----------
-    compute : returns the rows of a tile
-    executor : where the tiles are computed; by default threads of this process, as the kernels run
-        without Python's lock
-    say : called when the executor has lost tiles
-    threads : most threads of this process; one where tiles are Python, which holds the lock
+    executor : where tasks are computed; by default threads of this process, as the kernels run without
+        Python's lock
+    say : called when the executor has lost tasks
+    compute : returns the rows of a task
+    threads : most threads of this process; one where tasks are Python, which holds the lock
+    following : returns the task that needs the rows of one with a name; None where there is none
 
-    A tile that fails there (a killed worker, a broken pool, a lost connection) is computed in this
-    process; only if that fails, too, is it an error.
+    A task that fails there (a killed worker, a broken pool, a lost connection) is computed in this process,
+    with those that follow it; only if that fails, too, is it an error.
     """
-    left = dict(tiles)
     if executor is not None:
-        lost: dict[int, BaseException] = {}
-        yield from _on_executor(left, executor, lost, compute)
-        left = {number: tiles[number] for number in sorted(lost)}
-        if left:
-            why = type(next(iter(lost.values()))).__name__
-            say(f"{len(left)} tiles were lost by the executor ({why}): they are computed here")
-    if left:
-        yield from _on_threads(left, compute, threads or processors())
-
-
-def _on_executor(
-    tiles: Mapping[int, T], executor: Executor, lost: dict[int, BaseException], compute: Compute
-) -> Iterator[tuple[int, Any]]:
-    numbers: dict[Future[Any], int] = {}
-    try:
-        for number, tile in tiles.items():
-            try:
-                numbers[executor.submit(compute, tile)] = number
-            except (
-                Exception
-            ) as error:  # a pool that is broken, or has been shut down, takes no more
-                lost[number] = error
-        for future in as_completed(numbers):
-            try:
-                rows = future.result()
-            except (Exception, CancelledError) as error:
-                lost[numbers[future]] = error
-                continue
-            yield numbers[future], rows
-    finally:
-        _cancel(numbers)
-
-
-def _on_threads(
-    tiles: Mapping[int, T], compute: Compute, threads: int
-) -> Iterator[tuple[int, Any]]:
-    count = min(threads, len(tiles))
+        lost: dict[K, tuple[T, BaseException]] = {}
+        yield from _followed(tasks, partial(executor.submit, compute), following, lost)
+        if lost:
+            why = type(next(iter(lost.values()))[1]).__name__
+            say(f"{len(lost)} tiles were lost by the executor ({why}): they are computed here")
+        tasks = {name: lost[name][0] for name in tasks if name in lost}
+    if not tasks:
+        return
+    count, stop = min(threads or processors(), len(tasks)), new_stop()
     pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
-    waiting = iter(tiles.items())
-    running: dict[Future[Any], int] = {}
-    stop = new_stop()
 
-    def start(most: int) -> None:
-        while len(running) < most and (following := next(waiting, None)) is not None:
-            running[pool.submit(compute, following[1], stop)] = following[0]
+    def submit(task: T) -> Future[Any]:
+        return pool.submit(compute, task, stop)
 
     try:
-        start(count * _AHEAD)
-        while running:
-            done = _first_done(running)
-            number = running.pop(done)
-            start(count * _AHEAD)
-            yield number, done.result()
+        yield from _followed(tasks, submit, following, None, count * _AHEAD)
     finally:
         stop[0] = 1  # after Ctrl-C nobody waits for what is under way
         pool.shutdown(cancel_futures=True)
 
 
-def _first_done(running: Iterable[Future[Any]]) -> Future[Any]:
-    """Wait for one future that is done.
-
-    (The iterator of ``as_completed``, dropped after its first, would end in the garbage collector, where
-    Ctrl-C is lost.)
-    """
-    return next(iter(wait(running, return_when=FIRST_COMPLETED).done))
-
-
-def _cancel(futures: Iterable[Future[Any]]) -> None:
-    for future in futures:
-        future.cancel()
-
-
-def compute_chains(
-    first: Mapping[K, T],
+def _followed(
+    tasks: Mapping[K, T],
+    submit: Callable[[T], Future[Any]],
     following: Callable[[K, Any], T | None],
-    executor: Executor | None,
-    say: Progress,
-    compute: Compute,
+    lost: dict[K, tuple[T, BaseException]] | None,
+    most: float = math.inf,
 ) -> Iterator[tuple[K, Any]]:
-    """Yield (name, rows) of tasks of which each needs the rows of the one before in its chain.
-
-    Parameters
-    ----------
-    first : first task of each chain
-    following : returns the next task of a chain from the rows of the last one; None at its end
-
-    What the executor loses is computed in this process.
-    """
-    stop = new_stop()
-    own = ThreadPoolExecutor(max(1, len(first))) if executor is None else None
+    """Yield (name, rows) of each task, at ``most`` under way; without a place for the lost ones they fail."""
+    waiting = iter(tasks.items())
     running: dict[Future[Any], tuple[K, T]] = {}
+    finished: SimpleQueue[Future[Any]] = SimpleQueue()
 
-    def submit(name: K, task: T) -> None:
-        future: Future[Any] = Future()
+    def start(name: K, task: T) -> None:
         try:
-            future = own.submit(compute, task, stop) if own else executor.submit(compute, task)  # type: ignore[union-attr] # one of them is there
-        except Exception as error:  # a pool that is broken takes no more
-            future.set_exception(error)
+            future = submit(task)
+        except Exception as error:  # a pool that is broken, or has been shut down, takes no more
+            if lost is None:
+                raise
+            lost[name] = task, error
+            return
         running[future] = name, task
+        future.add_done_callback(finished.put)
+
+    def fill() -> None:
+        while len(running) < most and (pair := next(waiting, None)) is not None:
+            start(*pair)
 
     try:
-        for name, task in first.items():
-            submit(name, task)
+        fill()
         while running:
-            done = _first_done(running)
-            name, task = running.pop(done)
+            name, task = running.pop(done := finished.get())
+            fill()
             try:
                 rows = done.result()
             except (Exception, CancelledError) as error:
-                if own is not None:
+                if lost is None:
                     raise
-                say(
-                    f"a part was lost by the executor ({type(error).__name__}): it is computed here"
-                )
-                rows = compute(task)
+                lost[name] = task, error
+                continue
             yield name, rows
             after = following(name, rows)
             if after is not None:
-                submit(name, after)
+                start(name, after)
     finally:
-        stop[0] = 1
-        _cancel(running)
-        if own is not None:
-            own.shutdown(cancel_futures=True)
+        for future in running:
+            future.cancel()
 
 
 class Timer:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
-from contfric.chaos.running import Progress, Timer, check_executor, compute_chains
+from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import inside
 from contfric.chaos.work import kept_rows
@@ -235,7 +235,8 @@ def _computed(
     try:
         if tasks:
             compiled(job.model)
-        for name, rows in compute_chains(tasks, following, executor, timer.say, compute_stretch):
+        found = compute_all(tasks, executor, timer.say, compute_stretch, following=following)
+        for name, rows in found:
             if kept is not None:
                 kept.write(job.directions.index(name) * parts + len(done[name]), vars(rows))
             done[name].append(rows)

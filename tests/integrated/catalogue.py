@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 
-from lugre_integrated import level
-
 from contfric.compiled import (
     field_signature,
     helper,
     kernel,
+    level_signature,
     observe_signature,
     period_signature,
     rate_signature,
@@ -106,6 +105,12 @@ def period_of(p, which, grad):
 @kernel(scale_signature)
 def scale_of(i, p):
     return p[TOLERANCE]
+
+
+@kernel(level_signature)
+def level(k, p, which, grad):
+    grad[:] = 0.0
+    return 0.0
 
 
 #: The scale of the states is the tolerance, so that one block of memory serves all tolerances.
