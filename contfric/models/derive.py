@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -112,7 +112,7 @@ def model_from(description: Description) -> Model:
 
 
 def as_described(
-    description: Description, sampler: Sampler, surfaces: Sequence[Surface]
+    description: Description, sampler: Sampler, surfaces: list[Surface]
 ) -> dict[str, Any]:
     """Return the parts of a model, by their names, that no mode of it is needed for."""
     return {
