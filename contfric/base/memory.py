@@ -1,4 +1,4 @@
-"""Whether what a user asks for fits into the memory of this machine: said before work begins."""
+"""What this machine has: processors, and memory, into which what a user asks for must fit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ from contfric.errors import ParameterError
 
 #: Memory that is taken for granted where the system does not tell (bytes).
 _ASSUMED = 2**36
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def available() -> int:

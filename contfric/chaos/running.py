@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from functools import partial
@@ -11,6 +10,7 @@ from queue import SimpleQueue
 from time import monotonic
 from typing import Any, TypeAlias, TypeVar
 
+from contfric.base.memory import processors
 from contfric.chaos.rows import new_stop
 from contfric.errors import ParameterError
 
@@ -23,13 +23,6 @@ K = TypeVar("K")
 #: Tiles that one process has under way for each of its threads: enough that none waits for the next,
 #: few enough that an interrupt has little to wait for.
 _AHEAD = 2
-
-
-def processors() -> int:
-    """Return how many processors this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def check_executor(executor: object) -> None:

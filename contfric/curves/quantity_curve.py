@@ -116,7 +116,7 @@ class QuantityCurve(Tabled):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the curve in the plane of the first two parameters, dashed where orbits are unstable."""
-        from contfric.plot.held import plot_quantity_curve
+        from contfric.plot.plane import plot_quantity_curve
 
         return plot_quantity_curve(self, ax=ax)
 

@@ -4,7 +4,8 @@ A quantity Q depends on the joints z and on the parameters p, and z on p through
 
 .. math:: \frac{dQ}{dp} = Q_p + Q_z \frac{dz}{dp}, \qquad F_z \frac{dz}{dp} = -F_p .
 
-The derivatives dz/dp are solved for once an orbit, and every quantity is differentiated in those directions
+The derivatives dz/dp are solved for once an orbit, by one elimination, that of Newton's method with the
+columns of F_p as right-hand sides. Every quantity is differentiated in those directions
 (:mod:`contfric.quantities`).
 """
 
@@ -16,15 +17,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from contfric.base.tabled import Columns, Tabled
+from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sensitivity import joint_sensitivities
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
 from contfric.quantities.registry import number_quantity
 
 #: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
 _AT_EVENT = 1e-9
+#: Joints that move this much faster than a parameter (relative): a fold, where they have no derivative.
+_FOLD = 1e9
 
 
 @dataclass(frozen=True, repr=False)
@@ -105,6 +108,31 @@ def by_parameters(orbit: Orbit) -> Directions:
         known = Directions(joint_sensitivities(orbit), np.eye(len(orbit.vector)))
         vars(orbit)["_by_parameters"] = known  # as a cached property of the orbit
     return known
+
+
+def joint_sensitivities(orbit: Orbit) -> FloatArray:
+    """Return the derivatives of the joints by every parameter, shape (N, 1 + n, parameters).
+
+    Raises
+    ------
+    ConvergenceError
+        If the orbit is not solved, or has no derivative: at a fold, or as one of a continuum.
+    """
+    if not orbit.converged:
+        raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
+    from contfric.orbit.moved import move_joints
+
+    system, vector = orbit.system, orbit.vector
+    moved = np.empty((*orbit.joints.shape, len(vector)))
+    right = move_joints(system.functions(), system.layout, orbit.joints, vector, moved)
+    size = 1.0 + float(np.max(np.abs(orbit.joints)))
+    if not np.max(np.abs(moved), initial=0.0) < _FOLD * size * (1.0 + right) < np.inf:
+        raise ConvergenceError(
+            "the orbit has no derivative by its parameters: it is at a fold or branch point, or one of a "
+            "continuum. Move along the branch and ask again",
+            orbit,
+        )
+    return moved
 
 
 def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Curves of bifurcations in the plane of two parameters, with their points of codimension two."""
+"""Curves in the plane of two parameters: bifurcations, points of codimension two, quantities."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from contfric.plot.style import (
     BLUE,
     GREEN,
     GREY,
+    LINE_WIDTH,
     NEXT_TO,
     ORANGE,
     PURPLE,
@@ -34,6 +35,7 @@ from contfric.plot.style import (
 if TYPE_CHECKING:
     from contfric.atlas.plane import Plane
     from contfric.curves.curve import Curve
+    from contfric.curves.quantity_curve import QuantityCurve
     from contfric.curves.special import SpecialPoint
 
 #: Colour and width of each kind: what bounds smooth families is strong, where the flow jumps it is fine.
@@ -60,6 +62,28 @@ _BELOW: Mapping[str, Any] = {
 }
 #: A point at which a curve is relabelled is marked small and not named.
 _RELABELS = "T"
+
+
+def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
+    """Draw a curve in its plane, dashed where orbits are unstable.
+
+    Parameters
+    ----------
+    curve : QuantityCurve
+    ax : Axes, optional
+        Where to draw; new axes by default.
+    """
+    ax = axes_or_new(ax)
+    label: str | None = curve.label
+    for stable, group in itertools.groupby(range(len(curve)), key=lambda k: bool(curve.stable[k])):
+        run = list(group)
+        part = curve.values[run[0] : run[-1] + 2]  # to the first point of the next run
+        look = STABLE if stable else UNSTABLE
+        ax.plot(*part.T, linestyle=look, color=BLUE, linewidth=LINE_WIDTH, label=label)
+        label = None
+    name_axes(ax, parameter_label(curve.parameters[0]), parameter_label(curve.parameters[1]))
+    ax.legend(fontsize=sized(SMALL), loc="best")
+    return ax
 
 
 def plot_curves(curves: Sequence[Curve], ax: Axes | None = None, *, special: bool = True) -> Axes:

@@ -11,7 +11,6 @@ Nothing is begun before the block has lasted :data:`_PATIENCE`: of a closed form
 from __future__ import annotations
 
 import inspect
-import os
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -22,6 +21,7 @@ from functools import wraps
 from threading import Event, Lock
 from typing import Any, ParamSpec, TypeVar
 
+from contfric.base.memory import processors
 from contfric.base.tally import count_apart
 from contfric.remember.journal import digest_of
 from contfric.remember.stored import UnstorableError, Writer
@@ -83,16 +83,10 @@ _HERE: ContextVar[_Advance | None] = ContextVar("contfric_advance", default=None
 _BESIDE: ContextVar[bool] = ContextVar("contfric_beside", default=False)
 
 
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 @contextmanager
 def in_advance() -> Iterator[None]:
     """Let calls be begun in advance while the block runs, where there is a second core."""
-    if _HERE.get() is not None or _cores() < 2:
+    if _HERE.get() is not None or processors() < 2:
         yield
         return
     advance = _Advance()

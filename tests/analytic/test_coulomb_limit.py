@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import contfric as cf
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 from coulomb_limit import distances, extrema, holds, released
 from coulomb_limit_theory import RELEASE, Law, amplification, amplitudes, interpolated

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
+import coulomb_integrated as integrated
 import mpmath as mp
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
-
-import coulomb_integrated as integrated
 from catalogue import OSCILLATOR
 from catalogue import flow as catalogue_flow
 

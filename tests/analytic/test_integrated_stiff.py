@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
-
 from lugre_integrated import flow, hit, observe, rate
+from scipy.integrate import solve_ivp
 
 NONE, EMPTY, NOTHING = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
 #: Omega, S, S0, sigma0, sigma1, c, vS of section 5.2

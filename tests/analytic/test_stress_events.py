@@ -5,24 +5,19 @@ The whole run is there; here are as many as take seconds, and that an event that
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-
-import pytest
-from mpmath import mp, mpf
-
-import contfric as cf
-from contfric.continuation import accuracy
-from contfric.continuation.events import ACCURACY
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 
 import bordered
 import chain
 import events
+import pytest
+from mpmath import mp, mpf
 from report import Tally
+
+import contfric as cf
+from contfric.continuation import accuracy
+from contfric.continuation.events import ACCURACY
 
 DIAGRAMS = {
     "S": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, (0.03, 0.39)),

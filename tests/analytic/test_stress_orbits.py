@@ -5,22 +5,17 @@ The whole run is there; here are as many as take seconds, and that an orbit that
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
-
-import numpy as np
-import pytest
-from mpmath import mp
-
-import contfric as cf
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 
 import agreement
 import chain
 import condition
+import numpy as np
 import orbits
+import pytest
+from mpmath import mp
+
+import contfric as cf
 
 PARAMS = {
     "with sticks": {"Omega": 0.5, "S": 0.32, "S0": 0.4},

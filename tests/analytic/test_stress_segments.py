@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
 pytest.importorskip("flint")
-FOLDER = str(Path(__file__).resolve().parents[2] / "benchmarks" / "stress")
-sys.path.insert(0, FOLDER)
-try:
-    import segment_flow
-    import segments
-    from report import Report, Tally
-    from segment_cases import draw_graze, draw_root
-finally:
-    sys.path.remove(FOLDER)
+import segment_flow
+import segments
+from report import Report, Tally
+from segment_cases import draw_graze, draw_root
 
 
 @pytest.fixture(scope="module")

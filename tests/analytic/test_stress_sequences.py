@@ -6,9 +6,7 @@ The reference itself is held by a matrix exponential (its states) and by dense s
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,18 +15,13 @@ from mpmath import mp, mpf
 import contfric as cf
 
 pytest.importorskip("flint")
-FOLDER = str(Path(__file__).resolve().parents[2] / "benchmarks" / "stress")
-sys.path.insert(0, FOLDER)
-try:
-    import sequence_compare
-    import sequences
-    from flint import arb
-    from motion import SLIDE_DOWN, SLIDE_UP, Start, follow
-    from reference import Law, Slide, working_precision
-    from report import Tally
-    from sequence_cases import draw
-finally:
-    sys.path.remove(FOLDER)
+import sequence_compare
+import sequences
+from flint import arb
+from motion import SLIDE_DOWN, SLIDE_UP, Start, follow
+from reference import Law, Slide, working_precision
+from report import Tally
+from sequence_cases import draw
 
 SEED = 2
 

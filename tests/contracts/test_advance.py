@@ -48,7 +48,7 @@ def endless(number: int) -> str:
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(advance, "_PATIENCE", -1.0)
-    monkeypatch.setattr(advance, "_cores", lambda: 2)
+    monkeypatch.setattr(advance, "processors", lambda: 2)
     CALLS.clear()
     yield
 
@@ -153,7 +153,7 @@ def test_ctrl_c_ends_what_is_waited_for_as_it_would_end_it_here() -> None:
 
 
 def test_nothing_is_begun_on_one_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(advance, "_cores", lambda: 1)
+    monkeypatch.setattr(advance, "processors", lambda: 1)
     with in_advance():
         assert not foresee(square, 2)
 
@@ -178,7 +178,7 @@ def test_a_diagram_is_the_same_to_the_last_bit(
 ) -> None:
     found: list[tuple[cf.Diagram, Counts]] = []
     for cores in (1, 2):
-        monkeypatch.setattr(advance, "_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(advance, "processors", lambda cores=cores: cores)
         before = counts()
         found.append((explored(*scene), counts() - before))
     (alone, its_counts), (beside, counts_beside) = found

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
 from types import ModuleType
 
-import matplotlib
+import pages
 import pytest
 
-matplotlib.use("Agg")
-DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "bridges.md").read_text()
+PAGE = pages.text_of("bridges")
 
 
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("bridges_gallery", DOCS / "gallery/bridges.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return pages.script("gallery/bridges.py")
 
 
 def test_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    scope: dict[str, object] = {}
-    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
-        exec(compile(block, "docs/bridges.md", "exec"), scope)
+    pages.run("bridges")
     shown = capsys.readouterr().out.splitlines()
     said = re.search(r"# (x-v\+ -> .*)", PAGE)
     assert said is not None
@@ -58,4 +49,4 @@ def test_pictures_are_drawn_and_shown(
         script.figure(kind)
         name = f"bridge_{kind.lower()}.png"
         assert (tmp_path / name).stat().st_size > 10_000
-        assert f"images/{name}" in PAGE and (DOCS / "images" / name).exists()
+        assert f"images/{name}" in PAGE and (pages.DOCS / "images" / name).exists()

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import re
 import shlex
-from pathlib import Path
 
 import pytest
+from pages import run, text_of
 
 from contfric.cli import main
 from contfric.cli.exits import Exit
 
-PAGE = (Path(__file__).parents[2] / "docs/census.md").read_text()
+PAGE = text_of("census")
 
 
 def test_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert blocks
-    scope: dict[str, object] = {}
-    for block in blocks:
-        exec(compile(block, "docs/census.md", "exec"), scope)
+    run("census")
     assert "1a False" in capsys.readouterr().out
 
 

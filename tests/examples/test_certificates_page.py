@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
+from pages import run, text_of
 
 from contfric.certify.files import verify
 
-PAGE = Path(__file__).parents[2] / "docs" / "certificates.md"
-TEXT = PAGE.read_text(encoding="utf-8")
+TEXT = text_of("certificates")
 
 
 @pytest.fixture(scope="module")
 def scope() -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for block in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL):
-        exec(compile(block, "certificates.md", "exec"), found)
-    return found
+    return run("certificates")
 
 
 def test_what_the_page_proves(scope: dict[str, Any]) -> None:

@@ -4,54 +4,52 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import DOCS, script, table, text_of
 
 import contfric as cf
 from contfric.study import read_study
 
-GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
-PAGE = (GALLERY / "chaos-models.md").read_text(encoding="utf-8")
-SCRIPT = runpy.run_path(str(GALLERY / "chaos_models.py"))
-
-
-def table(name: str) -> list[list[str]]:
-    found = re.search(rf"<!-- table: {name} -->\n(.*?)\n<!-- end -->", PAGE, re.DOTALL)
-    assert found is not None
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[1].splitlines()]
-    return rows[2:]
+PAGE = text_of("gallery/chaos-models")
+SCRIPT = vars(script("gallery/chaos_models.py"))
 
 
 def test_tables_are_those_of_the_script() -> None:
-    assert [row[0] for row in table("maps")] == [f"`{model}`" for model in SCRIPT["MAPS"]]
-    assert [float(row[0]) for row in table("doublings")] == [F for F, _ in SCRIPT["DOUBLINGS"]]
-    assert [row[0] for row in table("chaos")] == [f"`{model}`" for model, *_ in SCRIPT["CHAOS"]]
+    assert [row[0] for row in table(PAGE, "table: maps")] == [
+        f"`{model}`" for model in SCRIPT["MAPS"]
+    ]
+    assert [float(row[0]) for row in table(PAGE, "table: doublings")] == [
+        F for F, _ in SCRIPT["DOUBLINGS"]
+    ]
+    assert [row[0] for row in table(PAGE, "table: chaos")] == [
+        f"`{model}`" for model, *_ in SCRIPT["CHAOS"]
+    ]
     for figure in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", PAGE):
-        assert (GALLERY / figure).is_file()
+        assert (DOCS / "gallery" / figure).is_file()
 
 
 def test_points_of_the_maps_add_up() -> None:
-    for row in table("maps"):
+    for row in table(PAGE, "table: maps"):
         rows, columns = (int(side) for side in row[1].split(" x "))
         assert sum(int(n) for n in re.findall(r"(\d+) [a-z_]+", row[3])) == rows * columns
 
 
 def test_two_estimates_of_each_chaotic_motion_agree() -> None:
     """As they stand there; that of Popp's oscillator is computed again (in tests/analytic the others)."""
-    for row in table("chaos"):
+    for row in table(PAGE, "table: chaos"):
         assert float(row[3].split(",")[0]) > 3.0 * float(row[4]) > 0.0
         assert float(row[7]) < 4.0
-    shown = table("chaos")[0]
+    shown = table(PAGE, "table: chaos")[0]
     found = cf.lyapunov_exponent("popp", {"omega": 1.69, "F": 0.1}, periods=600, tolerance=0.0)
     error = np.hypot(found.error, float(shown[4]))
     assert abs(found.largest - float(shown[3].split(",")[0])) < 4.0 * error
 
 
 def test_an_exponent_vanishes_at_a_doubling() -> None:
-    shown = {float(row[0]): row for row in table("doublings")}
+    shown = {float(row[0]): row for row in table(PAGE, "table: doublings")}
     F, omega = SCRIPT["DOUBLINGS"][0]
     found = SCRIPT["vanishes"](F, omega, 1.0)
     assert found == pytest.approx(omega, abs=3e-6)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import table, text_of
 
 import contfric as cf
 
-PAGE = (Path(__file__).parents[2] / "docs" / "gallery" / "chaos.md").read_text(encoding="utf-8")
+PAGE = text_of("gallery/chaos")
 
 
 def motions(omega: object, S: object, S0: float, confirm: int = 3000) -> cf.LyapunovMap:
@@ -20,15 +20,8 @@ def motions(omega: object, S: object, S0: float, confirm: int = 3000) -> cf.Lyap
     return cf.lyapunov_map("coulomb", grid, fixed, state=state, periods=2000, confirm=confirm)
 
 
-def table(name: str) -> list[list[str]]:
-    found = re.search(rf"<!-- table: {name} -->\n(.*?)\n<!-- end -->", PAGE, re.DOTALL)
-    assert found is not None
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in found[1].splitlines()]
-    return rows[2:]
-
-
 def test_the_band_is_chaotic_inside_and_not_beside() -> None:
-    for S, _, ends, _ in table("band"):
+    for S, _, ends, _ in table(PAGE, "table: band"):
         low, high = (float(end) for end in ends.split(" to "))
         found = motions([low - 0.01, low, high, high + 0.01], float(S), 0.3)
         assert found.chaotic[:, 0].tolist() == [False, True, True, False]
@@ -41,7 +34,9 @@ def test_the_line_at_one_half() -> None:
 
 
 @pytest.mark.parametrize(
-    "row", [row for row in table("maps") if row[1] == "0"], ids=lambda row: f"S0={row[0]}"
+    "row",
+    [row for row in table(PAGE, "table: maps") if row[1] == "0"],
+    ids=lambda row: f"S0={row[0]}",
 )
 def test_no_chaos_far_above_the_largest_friction_of_chaos(row: list[str]) -> None:
     S0, largest = float(row[0]), float(row[3])

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 
-import matplotlib
+import pages
 import pytest
+from pages import DOCS
 
 import contfric as cf
 
-matplotlib.use("Agg")
-DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "curves.md").read_text(encoding="utf-8")
+PAGE = pages.text_of("curves")
 
 
 def test_code_runs(capsys: pytest.CaptureFixture[str]) -> None:
-    scope: dict[str, object] = {}
-    for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
-        exec(compile(block, "docs/curves.md", "exec"), scope)
+    pages.run("curves")
     shown = capsys.readouterr().out
     assert "SN_1a" in shown
     assert "<SN-CS of 1a: Omega=0.535596272541" in shown
@@ -48,23 +43,18 @@ def test_numbers_are_computed(plane: cf.Plane) -> None:
 
 
 def test_gallery_page_has_every_plane(plane: cf.Plane) -> None:
-    spec = importlib.util.spec_from_file_location("planes", DOCS / "gallery/planes.py")
-    assert spec is not None and spec.loader is not None
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    page = (DOCS / "gallery/planes.md").read_text(encoding="utf-8")
+    script, page = pages.script("gallery/planes.py"), pages.text_of("gallery/planes")
     for name in script.STUDIES:
         assert (DOCS / "images/gallery" / f"{name}.png").is_file()
-        table = re.search(rf"<!-- plane: {name} -->\n(.*?)<!-- end -->", page, re.DOTALL)
-        assert table is not None and "| point | orbit |" in table[1], name
+        assert "| point | orbit |" in pages.part(page, f"plane: {name}"), name
     # the fold and the branch point of Fig. 9, to the digits of the table
     published = [
         line for line in script.table_of(plane) if line.startswith(("| SN-CS | 1a", "| DBP"))
     ]
-    fig09 = re.search(r"<!-- plane: fig09 -->\n(.*?)<!-- end -->", page, re.DOTALL)
-    assert fig09 is not None and len(published) == 2
+    fig09 = pages.part(page, "plane: fig09")
+    assert len(published) == 2
     for line in published:
         values = [float(cell) for cell in line.split("|")[3:5]]
-        listed = re.findall(r"\| (\d\.\d{9}) \| (\d\.\d{9}) \|", fig09[1])
+        listed = re.findall(r"\| (\d\.\d{9}) \| (\d\.\d{9}) \|", fig09)
         near = [abs(float(a) - values[0]) + abs(float(b) - values[1]) for a, b in listed]
         assert min(near) < 1e-8

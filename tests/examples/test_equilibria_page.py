@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
-
-PAGE = Path(__file__).parents[2] / "docs" / "equilibria.md"
+from pages import run, text_of
 
 
 def test_the_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    for model in re.findall(r"```yaml\n(name:.*?)```", text, re.DOTALL):
+    for model in re.findall(r"```yaml\n(name:.*?)```", text_of("equilibria"), re.DOTALL):
         name = model.split("\n")[0].removeprefix("name: ")
         (tmp_path / f"{name}.yaml").write_text(model, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    scope: dict[str, Any] = {}
-    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-        exec(compile(block, str(PAGE), "exec"), scope)
+    scope = run("equilibria")
     assert scope["hopf"].value == pytest.approx(0.48, abs=1e-13) and scope["hopf"].label == "H+"
     assert scope["diagram"].loose_ends == () and len(scope["diagram"].branches) == 2
     (touch,) = [b for b in scope["diagram"].bifurcations if b.kind.value == "GS"]

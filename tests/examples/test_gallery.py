@@ -2,34 +2,22 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import sys
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import networkx as nx
 import numpy as np
 import pytest
+from pages import DOCS, script
 
 from contfric.signature.notation import parse_signature
 
-GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+GALLERY = DOCS / "gallery"
 
 
-def load_script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("gallery_make", GALLERY / "make.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-make = load_script()
+make = script("gallery/make.py")
 PAGE_OF = {study: page for page, studies in make.PAGES.items() for study in studies}
 #: Studies of minutes are computed by ``make gallery`` alone; tests/analytic/test_lugre.py has their numbers.
 DIAGRAMS = [name for name in make.STUDIES if name != "fig03" and name not in make.LONG]

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import runpy
 from pathlib import Path
 
 import pytest
+from pages import DOCS, script, table, text_of
 
 import contfric as cf
 from contfric.study import read_study
 from contfric.study.result import StudyResult
 
-GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
-SCRIPT = runpy.run_path(str(GALLERY / "literature.py"))
+GALLERY = DOCS / "gallery"
+SCRIPT = vars(script("gallery/literature.py"))
 
 
 def computed(name: str, folder: Path) -> StudyResult:
@@ -22,20 +22,13 @@ def computed(name: str, folder: Path) -> StudyResult:
     return cf.run_study(dataclasses.replace(read_study(name), drawings=()), folder / "out")
 
 
-def shown_table(page: str, marker: str) -> list[list[str]]:
-    """Return the rows of the table after a marker, without its head."""
-    found = re.search(rf"<!-- {marker} -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
-    assert found is not None
-    return [[c.strip() for c in row.strip("|").split("|")] for row in found[1].splitlines()[2:]]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPT["STUDIES"])
 def test_table_is_what_is_computed(name: str, tmp_path: Path) -> None:
     diagram = computed(name, tmp_path).diagram
     assert diagram is not None
-    page = (GALLERY / f"{name}.md").read_text(encoding="utf-8")
-    shown = shown_table(page, f"events: {name}")
+    page = text_of(f"gallery/{name}")
+    shown = table(page, f"events: {name}")
     rows = SCRIPT["rows_of"](diagram)
     assert [(event, names) for event, _, names in shown] == [
         (event, names) for event, _, names in rows
@@ -54,8 +47,8 @@ def figures_exist(page: str) -> None:
 def test_table_of_plane_is_what_is_computed(name: str, on: str, tmp_path: Path) -> None:
     plane = computed(name, tmp_path).plane
     assert plane is not None
-    page = (GALLERY / f"{on}.md").read_text(encoding="utf-8")
-    shown = shown_table(page, f"plane: {name}")
+    page = text_of(f"gallery/{on}")
+    shown = table(page, f"plane: {name}")
     rows = SCRIPT["points_of"](plane)
     assert [tuple(row[:2]) for row in shown] == [row[:2] for row in rows] and rows
     for row, (*_, one, other) in zip(shown, rows, strict=True):

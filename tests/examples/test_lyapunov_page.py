@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
-from typing import Any
 
-import matplotlib
+from pages import blocks, run, text_of
 
 import contfric as cf
 
-matplotlib.use("Agg")
-PAGE = (Path(__file__).parents[2] / "docs" / "lyapunov.md").read_text(encoding="utf-8")
+PAGE = text_of("lyapunov")
 
 
 def test_code_runs() -> None:
-    blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert len(blocks) == 3
-    scope: dict[str, Any] = {}
-    for block in blocks:
-        exec(compile(block, "docs/lyapunov.md", "exec"), scope)
+    scope = run("lyapunov")
+    assert len(blocks(PAGE)) == 3
     assert scope["found"].motion is cf.Motion.CHAOTIC
     assert scope["both"].coexisting.tolist() == [[False], [True]]
     assert scope["short"].chaotic.tolist() == [[True]]
@@ -32,5 +26,5 @@ def test_table_has_every_motion_in_its_order() -> None:
 
 
 def test_the_code_that_needs_other_machines_is_python() -> None:
-    (block,) = re.findall(r"```py\n(.*?)```", PAGE, re.DOTALL)
+    (block,) = blocks(PAGE, "py")
     compile(block, "docs/lyapunov.md", "exec")

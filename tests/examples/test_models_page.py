@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
+from pages import blocks, run, text_of
 
 import contfric as cf
 
-PAGE = Path(__file__).parents[2] / "docs" / "models.md"
+PAGE = text_of("models")
 
 
 def test_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    model, *_ = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
-    (tmp_path / "my_block.yaml").write_text(model, encoding="utf-8")
+    (tmp_path / "my_block.yaml").write_text(blocks(PAGE, "yaml")[0], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    scope: dict[str, object] = {}
-    for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
-        exec(compile(block, str(PAGE), "exec"), scope)
+    run("models")
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "model my_block"
     assert "ok" in lines
     assert lines[-1] == "True True"
 
 
-EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1:]
+EXAMPLES = blocks(PAGE, "yaml")[1:]
 #: The itineraries of their orbits: domains may be many, modes are few.
 WORDS = {
     "neuron": {("rest", "threshold")},

@@ -2,38 +2,29 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
 from typing import Any
-
-import matplotlib
-
-matplotlib.use("Agg")
 
 import numpy as np
 import pytest
+from pages import blocks, run, text_of
 
 import contfric as cf
 
-PAGE = Path(__file__).parents[2] / "docs" / "quantities.md"
+PAGE = text_of("quantities")
 
 
 @pytest.fixture(scope="module")
 def scope() -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 9
-    for block in blocks:
-        exec(compile(block, str(PAGE), "exec"), found)
-    return found
+    assert len(blocks(PAGE)) == 9
+    return run("quantities")
 
 
 def test_the_page_says_what_comes_out(scope: dict[str, Any]) -> None:
     assert scope["low"][-1].x_max == pytest.approx(1.43, abs=1e-13)
-    assert str(scope["low"].ends[1]) in PAGE.read_text(encoding="utf-8")
+    assert str(scope["low"].ends[1]) in PAGE
     assert np.max(np.abs(scope["curve"].measured("x_max") - 1.43)) < 1e-11
     names = set(cf.quantity_names("coulomb"))
-    assert {name for name in names if f"`{name}`" not in PAGE.read_text(encoding="utf-8")} == set()
+    assert {name for name in names if f"`{name}`" not in PAGE} == set()
 
 
 def test_the_fits_find_the_truth(scope: dict[str, Any]) -> None:

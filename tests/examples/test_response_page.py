@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
-import matplotlib
-
-matplotlib.use("Agg")
-PAGE = Path(__file__).parents[2] / "docs" / "response.md"
+from pages import blocks, run, text_of
 
 
 def test_the_page_runs() -> None:
-    scope: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 5
-    for block in blocks:
-        exec(compile(block, str(PAGE), "exec"), scope)
-    shares = [share.share for share in scope["found"].shares]  # type: ignore[attr-defined]
+    assert len(blocks(text_of("response"))) == 5
+    shares = [share.share for share in run("response")["found"].shares]
     assert len(shares) == 3 and abs(sum(shares) - 1.0) < 1e-12

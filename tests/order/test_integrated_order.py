@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
-
 from catalogue import OSCILLATOR, flow
 from fixed_steps import fixed_steps
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from math import comb
-from pathlib import Path
 
 import numpy as np
 import pytest
+import restarts
 
 import contfric as cf
 from contfric.continuation.arms import arms_at, passages, turning_passages
@@ -17,9 +16,6 @@ from contfric.continuation.points import settings_of
 from contfric.continuation.sequences import count, lengths
 from contfric.orbit.apart import cyclic_apart, farthest_apart
 from contfric.orbit.linear import assembled
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
-import restarts
 
 #: Random scenes (of seed 31) with folds of bridges of several holds, and most periods of their orbits.
 SCENES = [(163, 1), (179, 1), (179, 2)]

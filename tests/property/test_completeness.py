@@ -6,12 +6,13 @@ are degenerate), and the scenes whose diagrams once differed.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+import restarts
+from report import Tally
 
 import contfric as cf
 from contfric.atlas.verification import differences
@@ -19,10 +20,6 @@ from contfric.continuation.conditions import possible, relation_of
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.sequences import count, lengths, necklaces
 from contfric.orbit.index import index_at_infinity, index_of, opening_sign
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
-import restarts
-from report import Tally
 
 #: The 60 scenes of the share that runs here, in parts that processes divide among themselves.
 SHARES = [range(start, start + 15) for start in range(0, 60, 15)]

@@ -5,22 +5,19 @@ The scenes are those of the stress run (``benchmarks/stress/restarts.py``), by s
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+import restarts
+from report import Tally
 
 import contfric as cf
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
 from contfric.continuation.report import ROUGH
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
-import restarts
-from report import Tally
 
 #: Scenes by what was wrong with them.
 CLASSES: dict[str, tuple[tuple[int, int], ...]] = {

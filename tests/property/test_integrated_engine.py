@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+import coulomb_integrated
 import numpy as np
 import pytest
 
 import contfric as cf
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
-
-import coulomb_integrated
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 

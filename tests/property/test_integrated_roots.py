@@ -9,23 +9,16 @@ from __future__ import annotations
 
 import json
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrated"))
-
-import contfric as cf
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "models"))
-
 from catalogue import HARMONICS, REST, hit
 from catalogue import stationary as kernel
 from harmonic_sum import definition
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import contfric as cf
 
 SUM = 2
 #: Values within this of the level are decided by rounding (sums here are of order 1 to 10).

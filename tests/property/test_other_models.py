@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
+import models
 import numpy as np
 import pytest
-
-import contfric as cf
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
-import models
 import restarts
 from report import Tally
+
+import contfric as cf
 
 FILES = Path(__file__).parents[1] / "models"
 #: Models whose scenes take up to a minute.

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 import contfric as cf
 from contfric.errors import ContfricError
-from contfric.orbit.gradient import by_parameters
+from contfric.orbit.gradient import by_parameters, joint_sensitivities
 from contfric.orbit.linear import jacobian_blocks, stacked
-from contfric.orbit.sensitivity import joint_sensitivities
 from contfric.orbit.solve import refine
 from contfric.quantities.motion import Motion
 

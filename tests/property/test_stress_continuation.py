@@ -5,19 +5,14 @@ Here in all five parameters, point by point; ``test_random_diagrams`` compares w
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-
-import pytest
-
-import contfric as cf
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 
 import continuation
+import pytest
 from report import Tally
+
+import contfric as cf
 
 BOUNDS = (0.4, 0.6)
 

@@ -45,8 +45,12 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.filippov import check_filippov
     from contfric.models.check.hidden import check_hidden
-    from contfric.models.check.kinks import check_kinks
-    from contfric.models.check.names import check_constraints, check_names
+    from contfric.models.check.names import (
+        check_constraints,
+        check_kinks,
+        check_names,
+        check_two_folds,
+    )
     from contfric.models.check.probe import Probe
     from contfric.models.check.scales import check_reached, check_scales
     from contfric.models.check.structure import (
@@ -58,7 +62,6 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
-    from contfric.models.check.two_folds import check_two_folds
     from contfric.models.tied import tied
 
     loaded, params = tied(model, params)

@@ -1,11 +1,15 @@
-"""Parameters that nothing depends on, states that nothing moves, and defaults outside of the constraints."""
+"""What formulas tell without a solution: names that nothing needs, defaults, unmarked kinks, two-folds."""
 
 from __future__ import annotations
 
+from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
 from contfric.models.grammar import parse
+
+#: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
+_STARTS = 40
 
 
 def check_constraints(report: ModelReport, model: Model) -> bool:
@@ -70,3 +74,51 @@ def _mentions(data: object, name: str) -> bool:
         return name in names_in(parse(data))
     except ModelError:
         return False
+
+
+def check_kinks(report: ModelReport, model: Model) -> None:
+    """Check that what the sides of each mode leave of abs, sign, min, max and where is nothing."""
+    if not model.definition:
+        return
+    from sympy import Symbol
+
+    from contfric.models.formulas import kinks_in
+    from contfric.models.symbols import Formulas
+
+    formulas = Formulas(from_text(model.definition))
+    symbols = (*formulas.y, *formulas.p)
+    names = dict(zip(symbols, (*model.states, *model.parameter_names), strict=True))
+    modes = [mode for mode in model.modes for _ in formulas.pieces]
+    for mode, field in zip(modes, formulas.fields(), strict=True):
+        for state, rate in zip(model.states, field, strict=True):
+            report.count(Topic.KINKS)
+            for kink in kinks_in(rate, (formulas.t, *formulas.y)):
+                text = kink.subs({s: Symbol(name) for s, name in names.items()})
+                report.warn(
+                    Topic.KINKS,
+                    f"the rate of '{state}' in mode '{mode.name}' has a kink where {text} = 0, which no "
+                    "side of the mode decides: add a surface there and a mode on each side (a factor "
+                    "is best written outside: abs(v)/vS in place of abs(v/vS)); without it the kink "
+                    "costs accuracy",
+                )
+
+
+def check_two_folds(report: ModelReport, probe: Probe) -> None:
+    """Name the two-folds of a model that is declared by formulas."""
+    model = probe.model
+    if not model.definition or len(model.states) + int(not model.autonomous) < 3:
+        return
+    from contfric.models.two_folds import find_two_folds
+
+    report.count(Topic.TWO_FOLDS)
+    for fold in find_two_folds(model, probe.params, starts=_STARTS):
+        where = ", ".join(
+            f"{name} = {value:.6g}" for name, value in zip(model.states, fold.state, strict=True)
+        )
+        when = "" if model.autonomous else f", t = {fold.time:.6g}"
+        wide = f" (one of a set of dimension {fold.dimension})" if fold.dimension else ""
+        report.note(
+            Topic.TWO_FOLDS,
+            f"two-fold on '{fold.surface}' between '{fold.above}' and '{fold.below}', {fold.kind.value}, "
+            f"at {where}{when}{wide}: motion that comes through it need not be unique",
+        )
