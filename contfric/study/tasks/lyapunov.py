@@ -9,27 +9,23 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import (
     STATE,
     Asked,
     FigureKind,
-    Found,
     Job,
-    Task,
     axes_text,
     grid_text,
     incomplete,
 )
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from contfric.chaos.map import LyapunovMap
-    from contfric.study.drawings import Drawing
     from contfric.study.read import Study
 
 
-class LyapunovTask(Task):
+class LyapunovTask(Response):
     """Lyapunov exponents on a grid of two parameters."""
 
     name = "lyapunov"
@@ -91,17 +87,6 @@ class LyapunovTask(Task):
             progress=job.told(self.name),
             **self.options(),
         )
-
-    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
-        """Draw the map."""
-        from contfric.plot.lyapunov import plot_lyapunov_map
-        from contfric.plot.names import full_title
-        from contfric.plot.style import TEXT, sized
-
-        lmap: LyapunovMap = found["lyapunov"]
-        axes = plot_lyapunov_map(lmap, ax=figure.add_subplot())
-        text = full_title(title, [*lmap.params, *lmap.axes], lmap.params)
-        axes.set_title(text, fontsize=sized(TEXT))
 
     def entry(self, found: LyapunovMap) -> dict[str, Any]:
         """Return what the trajectories of a map turned out to be."""
