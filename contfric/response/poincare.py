@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contfric.errors import mapping_of, real_number
+from contfric.errors import (
+    mapping_of,
+    real_number,
+)
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.tied import tied
