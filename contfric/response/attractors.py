@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.errors import AperiodicError, ConvergenceError, ParameterError, items_of, shown
+from contfric.errors import (
+    AperiodicError,
+    ConvergenceError,
+    ParameterError,
+    items_of,
+    shown,
+)
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit, Status

@@ -36,10 +36,10 @@ class ShareTask(Task):
     digits: int = Field(3, ge=0, description="a whole number >= 0")
     asked: ClassVar[list[str]] = []
 
-    def check(self, located, content, model, params) -> None:
+    def check(self, asked) -> None:
         for name in self.of:
-            if name not in params:
-                located.fail((self.name, "of"), f"no parameter '{name}'")
+            if name not in asked.params:
+                asked.fail((self.name, "of"), f"no parameter '{name}'")
 
     def does(self, study) -> str:
         return f"the share {self.of[0]} / {self.of[1]}"
