@@ -182,7 +182,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("contfric")
-    return _find(name)
+    globals()[name] = found = _find(name)  # the next look-up costs nothing
+    return found
 
 
 def __dir__() -> list[str]:

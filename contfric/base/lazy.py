@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -32,8 +31,6 @@ def lazily(
         from contfric.base.interrupts import held_back
 
         with held_back():
-            found = getattr(import_module(where[name]), name)
-        vars(sys.modules[package])[name] = found  # the next look-up costs nothing
-        return found
+            return getattr(import_module(where[name]), name)
 
     return sorted(where), find, lambda: sorted(where)
