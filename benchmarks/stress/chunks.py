@@ -14,6 +14,9 @@ from pathlib import Path
 
 from report import Failure, Report, Tally, say
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from origin import commit
+
 Progress = Callable[[str], None] | None
 
 
@@ -49,18 +52,21 @@ class Chunked:
     ) -> Report:
         """Run ``count`` cases; with ``out``, what is done is kept there and not done again."""
         began = time.perf_counter()
-        done, spent = restore(out, seed)
+        done, spent, commits = restore(out, seed)
         ranges = [(a, min(a + self.size, count)) for a in range(0, count, self.size)]
         todo = [r for r in ranges if f"{r[0]}-{r[1]}" not in done]
+        if todo and commit() not in commits:
+            commits.append(commit())
         for (first, last), tally in zip(todo, self._results(seed, todo, workers), strict=True):
             done[f"{first}-{last}"] = tally
             if out is not None:
-                keep(out, seed, done, spent + time.perf_counter() - began)
+                keep(out, seed, done, spent + time.perf_counter() - began, commits)
             if progress is not None:
                 failed = len(self.merged(list(done.values())).failed)
                 progress(f"{len(done)}/{len(ranges)} chunks, {failed} failed")
         whole = self.merged([done[f"{a}-{b}"] for a, b in ranges])
-        return whole.report(self.name, self.what, count, seed, spent + time.perf_counter() - began)
+        seconds = spent + time.perf_counter() - began
+        return whole.report(self.name, self.what, count, seed, seconds, ", ".join(commits))
 
     def merged(self, tallies: list[Tally]) -> Tally:
         """Return one tally for all."""
@@ -74,6 +80,7 @@ class Chunked:
             for name, value in tally.worst.items():
                 whole.largest(name, value)
             whole.failed.extend(tally.failed)
+            whole.aside.extend(tally.aside)
         self.tidy(whole.worst)
         return whole
 
@@ -100,23 +107,25 @@ class Chunked:
         sys.exit(1 if report.failed else 0)
 
 
-def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float) -> None:
+def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float, commits: list[str]) -> None:
     """Write what is done, next to the report to come."""
-    data = {"seed": seed, "seconds": seconds, "done": {k: asdict(v) for k, v in done.items()}}
+    tallies = {k: asdict(v) for k, v in done.items()}
+    data = {"seed": seed, "seconds": seconds, "commits": commits, "done": tallies}
     part = out.with_suffix(".part")
     part.write_text(json.dumps(data), encoding="utf-8")
     part.replace(out.with_suffix(".chunks"))
 
 
-def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float]:
-    """Return what an earlier run with the same seed has done, and the time it took."""
+def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float, list[str]]:
+    """Return what an earlier run with the same seed has done, the time it took, and on which commits."""
     path = None if out is None else out.with_suffix(".chunks")
     if path is None or not path.exists():
-        return {}, 0.0
+        return {}, 0.0, []
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["seed"] != seed:
-        return {}, 0.0
+        return {}, 0.0, []
     done = {}
     for name, tally in data["done"].items():
-        done[name] = Tally(**{**tally, "failed": [Failure(**f) for f in tally["failed"]]})
-    return done, data["seconds"]
+        listed = {k: [Failure(**f) for f in tally.get(k, ())] for k in ("failed", "aside")}
+        done[name] = Tally(**{**tally, **listed})
+    return done, data["seconds"], data.get("commits", [])
