@@ -14,7 +14,7 @@ from pathlib import Path
 
 from report import Failure, Report, Tally, say
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 from origin import commit
 
 Progress = Callable[[str], None] | None
