@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -34,13 +34,15 @@ class Chunked:
     chunk : from a seed and a range of indices to the tally of those cases
     size : cases of a chunk, so many that one takes some ten seconds
     tidy : drops largest values that the report does not name
+    limit : processor seconds of a case, where the chunk has an argument of that name
     """
 
     name: str
     what: str
-    chunk: Callable[[int, int, int], Tally]
+    chunk: Callable[..., Tally]
     size: int
     tidy: Callable[[dict[str, float]], None] = keep_all
+    limit: float | None = None
 
     def run(
         self,
@@ -99,8 +101,14 @@ class Chunked:
         parser.add_argument("--seed", type=int, default=seed)
         parser.add_argument("--workers", type=int, default=1)
         parser.add_argument("--out", type=Path)
+        if self.limit is not None:
+            text = "processor seconds of a case; what takes longer is cut"
+            parser.add_argument("--limit", type=float, default=self.limit, help=text)
         args = parser.parse_args()
-        report = self.run(args.count, args.seed, say, args.workers, args.out)
+        limited = self
+        if self.limit is not None and args.limit != self.limit:
+            limited = replace(self, chunk=partial(self.chunk, limit=args.limit))
+        report = limited.run(args.count, args.seed, say, args.workers, args.out)
         print(*report.lines(), sep="\n")
         if args.out is not None:
             report.write(args.out)

@@ -106,7 +106,9 @@ def chunk(
             with time_limit(limit):
                 one_scene(tally, draw(seed, index), max_periods=most_periods)
         except TimeoutError:
-            tally.set_aside("cut: longer than the limit of a scene", f"{draw(seed, index)}")
+            tally.set_aside(
+                f"cut: longer than {limit:g} s of the processor", f"{draw(seed, index)}"
+            )
         except (
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
@@ -171,7 +173,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     tally.met("sums that tell of another component", len(held.missing))
 
 
-RUN = Chunked("restarts", WHAT, chunk, CHUNK)
+RUN = Chunked("restarts", WHAT, chunk, CHUNK, limit=LIMIT)
 
 if __name__ == "__main__":
     RUN.command_line(count=60, seed=0)

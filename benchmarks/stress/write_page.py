@@ -47,9 +47,9 @@ to each other than 1e-7 of the range.
 
 **What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
 failures: all cases with S = S0, or with Omega = 1/n and no damping; two events at one point with the same
-solution; and smooth events at which a second condition fails (`contfric/atlas/degenerate.py`). Cases of
-more than four minutes are cut (in runs that name no commit: of more than a minute, or of too many branches).
-The tables show how many there are.
+solution; and smooth events at which a second condition fails (`contfric/atlas/degenerate.py`). Cases that
+take longer than a limit are cut (in runs that name no commit those with too many branches, too). The tables
+show how many there are.
 
 **To repeat.** `make stress` repeats everything. One run, and the page:
 
