@@ -57,10 +57,9 @@ class Chunked:
         done, spent, commits = restore(out, seed)
         ranges = [(a, min(a + self.size, count)) for a in range(0, count, self.size)]
         todo = [r for r in ranges if f"{r[0]}-{r[1]}" not in done]
-        if todo and commit() not in commits:
-            commits.append(commit())
+        here = commit()
         for (first, last), tally in zip(todo, self._results(seed, todo, workers), strict=True):
-            done[f"{first}-{last}"] = tally
+            done[f"{first}-{last}"], commits[f"{first}-{last}"] = tally, here
             if out is not None:
                 keep(out, seed, done, spent + time.perf_counter() - began, commits)
             if progress is not None:
@@ -68,7 +67,8 @@ class Chunked:
                 progress(f"{len(done)}/{len(ranges)} chunks, {failed} failed")
         whole = self.merged([done[f"{a}-{b}"] for a, b in ranges])
         seconds = spent + time.perf_counter() - began
-        return whole.report(self.name, self.what, count, seed, seconds, ", ".join(commits))
+        at = in_words({r: commits.get(f"{r[0]}-{r[1]}", "") for r in ranges})
+        return whole.report(self.name, self.what, count, seed, seconds, at)
 
     def merged(self, tallies: list[Tally]) -> Tally:
         """Return one tally for all."""
@@ -115,7 +115,27 @@ class Chunked:
         sys.exit(1 if report.failed else 0)
 
 
-def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float, commits: list[str]) -> None:
+def in_words(commits: dict[tuple[int, int], str]) -> str:
+    """Return the commit of most chunks, and the cases that were run on others.
+
+    Examples
+    --------
+    >>> in_words({(0, 10): "a", (10, 20): "b", (20, 25): "a"})
+    'a (cases 10 to 19: b)'
+    """
+    names = list(commits.values())
+    if not any(names):
+        return ""
+    most = max(dict.fromkeys(names), key=names.count)
+    others = [
+        f"cases {a} to {b - 1}: {c or 'unknown'}" for (a, b), c in commits.items() if c != most
+    ]
+    return f"{most} ({'; '.join(others)})" if others else most
+
+
+def keep(
+    out: Path, seed: int, done: dict[str, Tally], seconds: float, commits: dict[str, str]
+) -> None:
     """Write what is done, next to the report to come."""
     tallies = {k: asdict(v) for k, v in done.items()}
     data = {"seed": seed, "seconds": seconds, "commits": commits, "done": tallies}
@@ -124,16 +144,16 @@ def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float, commits: 
     part.replace(out.with_suffix(".chunks"))
 
 
-def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float, list[str]]:
-    """Return what an earlier run with the same seed has done, the time it took, and on which commits."""
+def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float, dict[str, str]]:
+    """Return what an earlier run with the same seed has done, the time it took, and each chunk's commit."""
     path = None if out is None else out.with_suffix(".chunks")
     if path is None or not path.exists():
-        return {}, 0.0, []
+        return {}, 0.0, {}
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["seed"] != seed:
-        return {}, 0.0, []
+        return {}, 0.0, {}
     done = {}
     for name, tally in data["done"].items():
         listed = {k: [Failure(**f) for f in tally.get(k, ())] for k in ("failed", "aside")}
         done[name] = Tally(**{**tally, **listed})
-    return done, data["seconds"], data.get("commits", [])
+    return done, data["seconds"], data.get("commits", {})

@@ -7,6 +7,7 @@ from pathlib import Path
 
 FOLDER = str(Path(__file__).resolve().parents[2] / "benchmarks" / "stress")
 sys.path.insert(0, FOLDER)
+from chunks import in_words  # noqa: E402
 from report import Report, Tally  # noqa: E402
 from write_page import page, sections_of  # noqa: E402
 
@@ -41,6 +42,13 @@ def test_a_report_is_read_as_it_was_written(tmp_path: Path) -> None:
     one = report(3, wrong=(1,), excused=(4,))
     one.write(tmp_path / "one.json")
     assert Report.read(tmp_path / "one.json") == one
+
+
+def test_cases_on_another_commit_are_named() -> None:
+    """A run that goes on later says which of its cases were run on other sources."""
+    assert in_words({(0, 10): "a", (10, 20): "a"}) == "a"
+    assert in_words({(0, 10): "a", (10, 20): "b", (20, 25): "a"}) == "a (cases 10 to 19: b)"
+    assert in_words({(0, 10): ""}) == ""
 
 
 def test_runs_that_are_not_given_stay() -> None:
