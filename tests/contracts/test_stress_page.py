@@ -62,7 +62,7 @@ def test_runs_that_are_not_given_stay() -> None:
     assert "* case 2, the same: it | differs" in both
     again = page([report(3)], both)
     assert "* case 2" not in again
-    assert again.count("seed 3") == 1
+    assert again.count("10 cases, seed 3,") == 1
     assert "| [restarts](#restarts) | 10 | 5 | 9 | 0 | 12 s |" in again
 
 
