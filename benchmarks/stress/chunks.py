@@ -8,11 +8,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from report import Failure, Report, Tally, say
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+from origin import commit
 
 Progress = Callable[[str], None] | None
 
@@ -31,13 +34,15 @@ class Chunked:
     chunk : from a seed and a range of indices to the tally of those cases
     size : cases of a chunk, so many that one takes some ten seconds
     tidy : drops largest values that the report does not name
+    limit : processor seconds of a case, where the chunk has an argument of that name
     """
 
     name: str
     what: str
-    chunk: Callable[[int, int, int], Tally]
+    chunk: Callable[..., Tally]
     size: int
     tidy: Callable[[dict[str, float]], None] = keep_all
+    limit: float | None = None
 
     def run(
         self,
@@ -49,18 +54,21 @@ class Chunked:
     ) -> Report:
         """Run ``count`` cases; with ``out``, what is done is kept there and not done again."""
         began = time.perf_counter()
-        done, spent = restore(out, seed)
+        done, spent, commits = restore(out, seed)
         ranges = [(a, min(a + self.size, count)) for a in range(0, count, self.size)]
         todo = [r for r in ranges if f"{r[0]}-{r[1]}" not in done]
+        here = commit()
         for (first, last), tally in zip(todo, self._results(seed, todo, workers), strict=True):
-            done[f"{first}-{last}"] = tally
+            done[f"{first}-{last}"], commits[f"{first}-{last}"] = tally, here
             if out is not None:
-                keep(out, seed, done, spent + time.perf_counter() - began)
+                keep(out, seed, done, spent + time.perf_counter() - began, commits)
             if progress is not None:
                 failed = len(self.merged(list(done.values())).failed)
                 progress(f"{len(done)}/{len(ranges)} chunks, {failed} failed")
         whole = self.merged([done[f"{a}-{b}"] for a, b in ranges])
-        return whole.report(self.name, self.what, count, seed, spent + time.perf_counter() - began)
+        seconds = spent + time.perf_counter() - began
+        at = in_words({r: commits.get(f"{r[0]}-{r[1]}", "") for r in ranges})
+        return whole.report(self.name, self.what, count, seed, seconds, at)
 
     def merged(self, tallies: list[Tally]) -> Tally:
         """Return one tally for all."""
@@ -74,6 +82,7 @@ class Chunked:
             for name, value in tally.worst.items():
                 whole.largest(name, value)
             whole.failed.extend(tally.failed)
+            whole.aside.extend(tally.aside)
         self.tidy(whole.worst)
         return whole
 
@@ -92,31 +101,59 @@ class Chunked:
         parser.add_argument("--seed", type=int, default=seed)
         parser.add_argument("--workers", type=int, default=1)
         parser.add_argument("--out", type=Path)
+        if self.limit is not None:
+            text = "processor seconds of a case; what takes longer is cut"
+            parser.add_argument("--limit", type=float, default=self.limit, help=text)
         args = parser.parse_args()
-        report = self.run(args.count, args.seed, say, args.workers, args.out)
+        limited = self
+        if self.limit is not None and args.limit != self.limit:
+            limited = replace(self, chunk=partial(self.chunk, limit=args.limit))
+        report = limited.run(args.count, args.seed, say, args.workers, args.out)
         print(*report.lines(), sep="\n")
         if args.out is not None:
             report.write(args.out)
         sys.exit(1 if report.failed else 0)
 
 
-def keep(out: Path, seed: int, done: dict[str, Tally], seconds: float) -> None:
+def in_words(commits: dict[tuple[int, int], str]) -> str:
+    """Return the commit of most chunks, and the cases that were run on others.
+
+    Examples
+    --------
+    >>> in_words({(0, 10): "a", (10, 20): "b", (20, 25): "a"})
+    'a (cases 10 to 19: b)'
+    """
+    names = list(commits.values())
+    if not any(names):
+        return ""
+    most = max(dict.fromkeys(names), key=names.count)
+    others = [
+        f"cases {a} to {b - 1}: {c or 'unknown'}" for (a, b), c in commits.items() if c != most
+    ]
+    return f"{most} ({'; '.join(others)})" if others else most
+
+
+def keep(
+    out: Path, seed: int, done: dict[str, Tally], seconds: float, commits: dict[str, str]
+) -> None:
     """Write what is done, next to the report to come."""
-    data = {"seed": seed, "seconds": seconds, "done": {k: asdict(v) for k, v in done.items()}}
+    tallies = {k: asdict(v) for k, v in done.items()}
+    data = {"seed": seed, "seconds": seconds, "commits": commits, "done": tallies}
     part = out.with_suffix(".part")
     part.write_text(json.dumps(data), encoding="utf-8")
     part.replace(out.with_suffix(".chunks"))
 
 
-def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float]:
-    """Return what an earlier run with the same seed has done, and the time it took."""
+def restore(out: Path | None, seed: int) -> tuple[dict[str, Tally], float, dict[str, str]]:
+    """Return what an earlier run with the same seed has done, the time it took, and each chunk's commit."""
     path = None if out is None else out.with_suffix(".chunks")
     if path is None or not path.exists():
-        return {}, 0.0
+        return {}, 0.0, {}
     data = json.loads(path.read_text(encoding="utf-8"))
     if data["seed"] != seed:
-        return {}, 0.0
+        return {}, 0.0, {}
     done = {}
     for name, tally in data["done"].items():
-        done[name] = Tally(**{**tally, "failed": [Failure(**f) for f in tally["failed"]]})
-    return done, data["seconds"]
+        listed = {k: [Failure(**f) for f in tally.get(k, ())] for k in ("failed", "aside")}
+        done[name] = Tally(**{**tally, **listed})
+    return done, data["seconds"], data.get("commits", {})

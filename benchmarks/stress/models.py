@@ -90,7 +90,13 @@ def _moved(base: Scene, rng: np.random.Generator) -> Scene:
     return replace(base, params=params, vary=vary, range=(first, first + width))
 
 
-RUN = Chunked("models", WHAT, partial(chunk, draw=scene, limit=LIMIT, most_periods=PERIODS), CHUNK)
+RUN = Chunked(
+    "models",
+    WHAT,
+    partial(chunk, draw=scene, limit=LIMIT, most_periods=PERIODS),
+    CHUNK,
+    limit=LIMIT,
+)
 
 if __name__ == "__main__":
     RUN.command_line(count=60, seed=0)

@@ -14,8 +14,15 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-#: Failures shown in the lines of a report; the JSON file has all of them.
-_SHOWN = 20
+#: Failures shown in the lines of a report, and characters of what is told of a case that is set aside; the
+#: JSON file has all of them.
+_SHOWN, _CHARACTERS = 20, 240
+
+
+def _short(text: str) -> str:
+    """Return a text that fits into a cell of a table."""
+    text = text.replace("|", "/").replace("\n", " ")
+    return text if len(text) <= _CHARACTERS else text[:_CHARACTERS] + " ..."
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,8 @@ class Report:
     worst : largest measured value of each quantity, by name
     counts : what was met on the way (ends by reason, refusals), by name
     seconds : run time
+    aside : cases that are neither right nor wrong (excused, cut), with the reason
+    commit : of the sources, several where a run went on later; with a plus where they were changed
     """
 
     name: str
@@ -53,10 +62,14 @@ class Report:
     worst: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     seconds: float = 0.0
+    aside: tuple[Failure, ...] = ()
+    commit: str = ""
 
     def lines(self) -> list[str]:
         """Return the report as lines of Markdown."""
-        rows = [f"{self.what} {self.count} cases, seed {self.seed}, {self.seconds:.0f} s.", ""]
+        at = f", commit {self.commit}" if self.commit else ""
+        rows = [f"{self.what} {self.count} cases, seed {self.seed}, {self.seconds:.0f} s{at}.", ""]
+        rows += self._shares()
         rows += ["| check | tried | passed | failed |", "|---|---:|---:|---:|"]
         for kind, tried in sorted(self.tried.items()):
             passed = self.passed.get(kind, 0)
@@ -67,11 +80,28 @@ class Report:
         if self.counts:
             rows += ["", "| met on the way | times |", "|---|---:|"]
             rows += [f"| {name} | {times} |" for name, times in sorted(self.counts.items())]
+        if self.aside:
+            rows += ["", "| case | excused or cut | what |", "|---:|---|---|"]
+            rows += [f"| {f.index} | {f.kind} | {_short(f.reason)} |" for f in self.aside]
         rows += [""] if self.failed else []
         rows += [f"* case {f.index}, {f.kind}: {f.reason}" for f in self.failed[:_SHOWN]]
         if len(self.failed) > _SHOWN:
             rows.append(f"* and {len(self.failed) - _SHOWN} more")
         return rows
+
+    def _shares(self) -> list[str]:
+        """Return how many of the cases that have a start are wrong, excused and cut; where some can be."""
+        starts = self.count - sum(
+            n for name, n in self.counts.items() if name.startswith("no start")
+        )
+        if "scenes" not in self.counts or not starts:
+            return []
+        found = {"wrong": {f.index for f in self.failed}}
+        for kind in ("excused", "cut"):
+            found[kind] = {f.index for f in self.aside if f.kind.startswith(kind)} - found["wrong"]
+        rows = [f"| of {starts} with a start | cases | share |", "|---|---:|---:|"]
+        rows += [f"| {k} | {len(v)} | {100.0 * len(v) / starts:.1f} % |" for k, v in found.items()]
+        return [*rows, ""]
 
     def write(self, path: Path) -> None:
         """Write the report as JSON."""
@@ -81,7 +111,8 @@ class Report:
     def read(cls, path: Path) -> Report:
         """Read a report that was written."""
         data = json.loads(path.read_text(encoding="utf-8"))
-        return cls(**{**data, "failed": tuple(Failure(**f) for f in data["failed"])})
+        listed = {k: tuple(Failure(**f) for f in data.get(k, ())) for k in ("failed", "aside")}
+        return cls(**{**data, **listed})
 
 
 @dataclass
@@ -94,6 +125,7 @@ class Tally:
     failed: list[Failure] = field(default_factory=list)
     worst: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
+    aside: list[Failure] = field(default_factory=list)
 
     def check(self, kind: str, fine: bool, reason: str = "") -> bool:
         """Count one check; the reason is kept if it failed."""
@@ -112,7 +144,14 @@ class Tally:
         """Count something that was met."""
         self.counts[name] = self.counts.get(name, 0) + times
 
-    def report(self, name: str, what: str, count: int, seed: int, seconds: float) -> Report:
+    def set_aside(self, kind: str, reason: str = "") -> None:
+        """Count a case that is neither right nor wrong, and keep why."""
+        self.met(kind)
+        self.aside.append(Failure(self.index, kind, reason))
+
+    def report(
+        self, name: str, what: str, count: int, seed: int, seconds: float, commit: str = ""
+    ) -> Report:
         """Return the report."""
         return Report(
             name,
@@ -125,6 +164,8 @@ class Tally:
             self.worst,
             self.counts,
             seconds,
+            tuple(self.aside),
+            commit,
         )
 
 

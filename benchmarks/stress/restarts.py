@@ -106,7 +106,9 @@ def chunk(
             with time_limit(limit):
                 one_scene(tally, draw(seed, index), max_periods=most_periods)
         except TimeoutError:
-            tally.met("cut: longer than the limit of a scene")
+            tally.set_aside(
+                f"cut: longer than {limit:g} s of the processor", f"{draw(seed, index)}"
+            )
         except (
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
@@ -132,7 +134,7 @@ def one_scene(
         tally.met(f"no start: {type(error).__name__}")
         return
     if not diagram.complete:
-        tally.met("cut: more branches than asked for")
+        tally.set_aside("cut: more branches than asked for", f"{found}")
         return
     tally.met("scenes")
     tally.met("branches", len(diagram.branches))
@@ -145,7 +147,7 @@ def one_scene(
     wrong = [orbit for orbit in points if not orbit.admissible]
     tally.met("points asked for admissibility", len(points))
     if wrong and name:
-        tally.met(f"excused: {name}")
+        tally.set_aside(f"excused: {name}", f"{len(wrong)} of {len(points)} points not admissible")
         return
     tally.check("all points admissible", not wrong, f"{found}: {len(wrong)} of {len(points)}")
 
@@ -154,7 +156,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     """Count what a verification has found."""
     for restart in held.restarts:
         if not restart.complete:
-            tally.met("cut: a restart with more branches than asked for")
+            tally.set_aside("cut: a restart with more branches than asked for", f"{found}")
             return
     tally.met("restarts", len(held.restarts))
     different = [str(r) for r in held.restarts if not r.same]
@@ -162,7 +164,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     if not name and held.degeneracies:
         name = held.degeneracies[0].rpartition(": ")[2]
     if name and (different or unbalanced):
-        tally.met(f"excused: {name}")
+        tally.set_aside(f"excused: {name}", "; ".join([*different, *unbalanced]))
         return
     tally.check("the same from every branch", not different, f"{found}: {different}")
     tally.met("balances", len(held.balances))
@@ -171,7 +173,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     tally.met("sums that tell of another component", len(held.missing))
 
 
-RUN = Chunked("restarts", WHAT, chunk, CHUNK)
+RUN = Chunked("restarts", WHAT, chunk, CHUNK, limit=LIMIT)
 
 if __name__ == "__main__":
     RUN.command_line(count=60, seed=0)

@@ -57,13 +57,17 @@ def _alike(a: Bifurcation, b: Bifurcation) -> bool:
     """Tell whether the solutions at two events may be taken for one, run through as often as it takes.
 
     Slides one after the other are compared: sequences of the same passages in another order are told apart.
-    Where one solution has more slides than the other, only their stops can be.
+    Where one solution has more slides than the other, some of them are left out; what has no order of its
+    slides is compared by its stops.
     """
     one, other = a.outline, b.outline
-    if len(one.starts) * other.periods != len(other.starts) * one.periods:
-        return stops_distance(a.orbit.stops, b.orbit.stops, mirror=True) < _ALIKE
     both = math.lcm(one.periods, other.periods)
-    return one.repeated(both).apart(other.repeated(both)) < _ALIKE
+    few, many = sorted((one.repeated(both), other.repeated(both)), key=lambda o: len(o.starts))
+    if len(few.starts) == len(many.starts):
+        return few.apart(many) < _ALIKE
+    if few.ordered and math.isfinite(few.cycle):
+        return few.is_part_of(many, _ALIKE)
+    return stops_distance(a.orbit.stops, b.orbit.stops, mirror=True) < _ALIKE
 
 
 def unresolved(branch: Branch, width: float) -> bool:

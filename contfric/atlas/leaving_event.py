@@ -9,6 +9,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
+from contfric.atlas.several_places import opening_together
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
@@ -47,7 +48,8 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     assert orbit is not None
     settings = settings_for(orbit, state.settings)
     if candidate.away is not None:
-        return _leave_beside(state, orbit, candidate.away, event, settings)
+        branch = _leave_beside(state, orbit, candidate.away, event, settings)
+        return branch or _leave_together(state, orbit, event, settings)
     for first_step in _NEAR_EVENT:
         longest, stands = _longest_way(orbit, event, settings, first_step, state.progress)
         if longest is not None or not stands:
@@ -142,10 +144,25 @@ def leave_singular(
 ) -> Branch | None:
     """Trace away from an event at which the curve has no unique direction.
 
-    Its directions lie in the plane of two null vectors; those at regular angles are tried.
+    Where several places open at once leading orders tell the direction. Others lie in the plane of two null
+    vectors; those at regular angles are tried.
     """
+    branch = _leave_together(state, orbit, event, settings)
+    if branch is not None:
+        return branch
     active = orbit.model.index_of(settings.parameter)
     for away in (*plane_of(orbit, active), *_line_of(orbit, active, settings)):
+        branch = _leave_beside(state, orbit, away, event, settings)
+        if branch is not None and branch.arc[-1] > _SURELY_AWAY:
+            return branch
+    return None
+
+
+def _leave_together(
+    state: Exploration, orbit: Orbit, event: Event, settings: Settings
+) -> Branch | None:
+    """Trace away from an event at which several places of an orbit open at once."""
+    for away in opening_together(orbit, orbit.model.index_of(settings.parameter)):
         branch = _leave_beside(state, orbit, away, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch

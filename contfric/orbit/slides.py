@@ -138,6 +138,28 @@ class Outline:
         cycles[[0, *self.angles]] = [self.cycle, *(2.0 * np.pi for _ in self.angles)]
         return cycles
 
+    def is_part_of(self, other: Outline, within: float) -> bool:
+        """Tell whether the slides are those of another solution (or its image) in order, some left out.
+
+        Both over the same number of periods, and with an order.
+        """
+        return any(self._in_order(there, within) for there in (other.starts, other.images))
+
+    def _in_order(self, there: FloatArray, within: float) -> bool:
+        gaps, cycles = np.abs(self.starts[:, None] - there[None]), self._cycles
+        turns = np.isfinite(cycles)
+        gaps[..., turns] = np.abs(
+            (gaps[..., turns] + 0.5 * cycles[turns]) % cycles[turns] - 0.5 * cycles[turns]
+        )
+        near = np.max(gaps, axis=2) < within
+        for first in map(int, np.flatnonzero(near[0])):
+            row = 0
+            for column in np.roll(near, -first, axis=1).T:  # the next one that fits is the best one
+                row += int(row < len(near) and column[row])
+            if row == len(near):
+                return True
+        return False
+
     def repeated(self, periods: int) -> Outline:
         """Return the same solution over a multiple of its periods."""
         times = periods // self.periods

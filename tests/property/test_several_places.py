@@ -1,0 +1,79 @@
+"""Events at which several slides of no length come in at once: how far each of them opens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.atlas.several_places import opening_together
+from contfric.continuation.candidates import sequences_of
+from contfric.continuation.events import TERMINAL
+from contfric.continuation.incident import Incident, incident_forms
+from contfric.continuation.unit import Form
+
+#: A static limit far above the kinetic one: rest may be left where its acceleration falls through zero.
+SCENE = {"Omega": 0.2935828642, "S": 0.122850703873, "S0": 0.49363345839, "h": 0.143075872}
+
+
+def events(seed: int) -> Iterator[tuple[Incident, int]]:
+    """Yield the sliding events of a small random diagram, and the index of the parameter."""
+    rng = np.random.default_rng(seed)
+    params = {name: value * (1.0 + rng.uniform(-0.05, 0.05)) for name, value in SCENE.items()}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    h = params["h"]
+    diagram = cf.explore(orbit, "h", (h - 0.03, h + 0.03), max_periods=1, max_branches=12)
+    active = orbit.model.index_of("h")
+    for node in diagram.nodes:
+        if node.bifurcation.kind in TERMINAL and not node.mirrored:
+            yield incident_forms(node.bifurcation), active
+
+
+def opened(incident: Incident) -> Iterator[Form]:
+    """Yield the forms in which a slide of no length comes in."""
+    return (form for form in incident.forms if np.any(form.away))
+
+
+def test_places_that_are_alike_open_alike() -> None:
+    """An orbit that is run through k times has its place k times, and each opens as far as the others."""
+    asked = 0
+    for seed in range(2, 4):
+        for incident, active in events(seed):
+            for form in opened(incident):
+                for copies in (2, 3):
+                    orbit, away = incident.unit.orbit((form,) * copies)
+                    ways = list(opening_together(orbit, active))
+                    assert len(ways) == 2
+                    wanted = away / np.max(np.abs(away))
+                    for way, sign in zip(
+                        ways, np.sign([w[:, 0] @ wanted for w in ways]), strict=True
+                    ):
+                        np.testing.assert_allclose(sign * way[:, 0], wanted, atol=1e-6)
+                        np.testing.assert_allclose(way[:, 1:], 0.0, atol=1e-6)
+                    asked += 1
+    assert asked >= 6
+
+
+def test_one_place_needs_no_proportion() -> None:
+    """Where one place is singular, or none, nothing is proposed."""
+    for incident, active in events(1):
+        for candidate in sequences_of(incident):
+            if candidate.orbit is not None and not candidate.orbit.system.half:
+                places = 0 if candidate.away is None else int(np.sum(candidate.away[:, 0] > 0.0))
+                assert places > 1 or not list(opening_together(candidate.orbit, active))
+
+
+@pytest.mark.slow
+def test_bridge_of_four_periods_with_two_openings() -> None:
+    """Two of its four periods begin with a slide of no length at the event: it is found from either side."""
+    orbit = cf.find_orbit("coulomb", {**SCENE, "zeta": 0.0}, longest=1000)
+    diagram = cf.explore(orbit, "h", (0.000257954805, 0.283842482943), max_branches=1000)
+    at_event = [n for n in diagram.events if abs(n.bifurcation.params["h"] - 0.1388625) < 1e-4]
+    assert any(
+        "6hold" in diagram.branches[i].name and diagram.branches[i].system.periods == 4
+        for node in at_event
+        for i in node.branches
+    )
+    assert not any("without any width" in p.why for node in at_event for p in node.proposals)
