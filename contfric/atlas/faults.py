@@ -9,8 +9,11 @@ import numpy as np
 from contfric.continuation.branch import Branch
 from contfric.models.definition import FloatArray
 from contfric.orbit.one_way import only_grows
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 
+#: Why an itinerary is refused in which a mode can only last for no time.
+ONLY_GROWS = "something only grows along it, as a slider's offset that slips to one side: it cannot come back"
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
 #: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
@@ -25,6 +28,11 @@ _SHORT, _ROUNDING = 1e-3, 1e-11
 #: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
 #: not vanish all along lasts at one of them.
 _ASKED = (0.25, 0.5, 0.75)
+
+
+def fault_of_itinerary(orbit: Orbit) -> str | None:
+    """Return what is wrong with the itinerary of an orbit, whatever its branch is; None if nothing is."""
+    return ONLY_GROWS if only_grows(orbit.model, orbit.as_whole().itinerary) else None
 
 
 def fault_of(branch: Branch) -> str | None:
@@ -44,7 +52,7 @@ def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
 
 def _only_touches(branch: Branch) -> bool:
     """Tell whether an itinerary has modes that no periodic motion is in (:mod:`contfric.orbit.one_way`)."""
-    return bool(only_grows(branch.model, branch[0].as_whole().itinerary))
+    return fault_of_itinerary(branch[0]) is not None
 
 
 def _never_held(branch: Branch) -> bool:
@@ -119,10 +127,7 @@ def _violates(branch: Branch) -> bool:
 
 #: What a branch must not be, and why it is refused then.
 _FAULTS = (
-    (
-        _only_touches,
-        "something only grows along it, as a slider's offset that slips to one side: it cannot come back",
-    ),
+    (_only_touches, ONLY_GROWS),
     (
         _never_held,
         "its hold has no length anywhere: the solution of another itinerary, that only touches rest",

@@ -18,7 +18,7 @@ from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
-from contfric.atlas.faults import fault_of
+from contfric.atlas.faults import fault_of, fault_of_itinerary
 from contfric.atlas.folds import follow_arms, follow_fold
 from contfric.atlas.leaving_event import leave_event, leave_singular, settings_for
 from contfric.atlas.matching import SAME_SOLUTION, same_kind
@@ -89,7 +89,10 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     edits = bool(orbit.model.resets) or any(
         mode.sliding for mode in orbit.model.modes
     )  # else nothing rests
-    for wide in (False, True) if edits else ():
+    # the forms are the same both times where the event is known roughly; what else the second time tries is
+    # what local conditions exclude, and these are not asked of many contacts
+    once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
+    for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
         itineraries: set[Itinerary] = set()
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
@@ -178,6 +181,10 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         state, event, candidate.orbit, candidate.reason
     ):
         return True
+    fault = fault_of_itinerary(candidate.orbit)
+    if fault is not None and not _begins_continuum(state, candidate.orbit, event):
+        state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)  # whatever is traced
+        return False
     branch = leave_event(state, candidate, event)
     if branch is None and event.bifurcation.accuracy > ACCURACY:
         assert candidate.orbit is not None

@@ -137,7 +137,9 @@ class _Problem:
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return F, shape (N,), and J, shape (N, N + 1)."""
         joints, vector = self.split(x)
-        residual, jacobian, column = equations_at(self.system, joints, vector, (self.active,))
+        residual, jacobian, column = equations_at(
+            self.system, joints, vector, (self.active,), at_joints=False
+        )  # its differences are second derivatives
         return residual, np.column_stack([jacobian, self.width * column])
 
     def hessian(self, x: FloatArray, psi: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -319,24 +320,19 @@ def _modes_alike(
     moved: list[tuple[float, list[float]]],
 ) -> dict[str, frozenset[str]]:
     """Return for each mode those whose field, at the images of some states, is the image of its own."""
-    evaluator, modes = sampler.evaluator, sampler.evaluator.description.modes
+    names = [mode.name for mode in sampler.evaluator.description.modes]
     here, there = (
-        {
-            mode.name: np.array(
-                [[evaluator.value(f, sampler.params, t, y) for f in mode.field] for t, y in at]
-            )
-            for mode in modes
-        }
+        np.array(
+            [[sampler.evaluator.field(name, sampler.params, t, y) for t, y in at] for name in names]
+        )
         for at in (points, moved)
     )
-    return {
-        name: frozenset(
-            other
-            for other, values in there.items()
-            if np.allclose(values, rates @ np.array(matrix).T, _SAME, _SAME, equal_nan=True)
-        )
-        for name, rates in here.items()
-    }
+    images = here @ np.array(matrix).T
+    found = {}
+    for name, image in zip(names, images, strict=True):
+        alike = np.isclose(there, image, _SAME, _SAME, equal_nan=True).all(axis=(1, 2))
+        found[name] = frozenset(itertools.compress(names, alike))
+    return found
 
 
 def _linear_map(description: Description) -> tuple[tuple[tuple[float, ...], ...], float]:

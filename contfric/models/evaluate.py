@@ -87,6 +87,20 @@ class Evaluator(Generic[T]):
         above = self.observable(observable, params, t, y)
         return above - self.value(level, params)  # type: ignore[operator,no-any-return]
 
+    def moving(self, surface: str) -> tuple[int, ...]:
+        """Return which of time (0) and states (from 1) the observable of a surface depends on."""
+        observable, _ = self._surface[surface]
+        if observable not in self._moving:
+            description = self.description
+            leaves = description.names.leaves_of(self._observable[observable])
+            names = (TIME, *description.states)
+            self._moving[observable] = tuple(i for i, name in enumerate(names) if name in leaves)
+        return self._moving[observable]
+
+    @cached_property
+    def _moving(self) -> dict[str, tuple[int, ...]]:
+        return {}
+
     def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
         """Return the rates of all states in a mode."""
         rates = self._fields[mode]
@@ -186,14 +200,15 @@ class Sampler:
 
     def gradient(self, surface: str, t: float, y: Sequence[float]) -> list[float]:
         """Return the derivatives of an observable by time and state, by differences."""
-        found, point = [], [t, *y]
-        for i in range(len(point)):
+        point = [t, *y]
+        found = [0.0] * len(point)
+        for i in self.evaluator.moving(surface):
             ahead, behind = list(point), list(point)
             ahead[i] += _DIFFERENCE
             behind[i] -= _DIFFERENCE
             up = self.evaluator.height(surface, self.params, ahead[0], ahead[1:])
             down = self.evaluator.height(surface, self.params, behind[0], behind[1:])
-            found.append((up - down) / (2 * _DIFFERENCE))
+            found[i] = (up - down) / (2 * _DIFFERENCE)
         return found
 
     def rate(self, mode: str, surface: str, side: int, t: float, y: Sequence[float]) -> float:

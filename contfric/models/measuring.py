@@ -9,6 +9,7 @@ labels and no events.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -53,20 +54,15 @@ def extrema_at_joints(sampler: Sampler, surfaces: list[Surface]) -> bool:
     if any(texts.get(x, x) != x for texts in description.resets.values()):
         return False
     cuts = {s.name for s in surfaces if s.switching} | set(description.resets)
-    first = joined_modes(description)
-    return all(
-        _keeps_its_sign(sampler, mode, cuts & _ends(description, mode, surfaces, first))
-        for mode in description.modes
-    )
+    first, parts = joined_modes(description), defaultdict(list)
+    for mode in description.modes:
+        parts[first[mode.name]].append(known_sides(mode, surfaces))
+    ends = {name: cuts & _ends(sides) for name, sides in parts.items()}
+    return all(_keeps_its_sign(sampler, mode, ends[first[mode.name]]) for mode in description.modes)
 
 
-def _ends(
-    description: Description, mode: ModeText, surfaces: list[Surface], first: Mapping[str, str]
-) -> set[str]:
-    """Return the surfaces that have all modes that are one with a mode on the same side."""
-    parts = [
-        known_sides(m, surfaces) for m in description.modes if first[m.name] == first[mode.name]
-    ]
+def _ends(parts: Sequence[Mapping[str, int]]) -> set[str]:
+    """Return the surfaces that have all modes that are one on the same side."""
     return {name for name, side in parts[0].items() if all(p.get(name) == side for p in parts)}
 
 

@@ -39,7 +39,7 @@ class Names:
         """Return the names; an observable that is a state itself needs no second one."""
         return cls(states, parameters, define, observables)
 
-    @property
+    @cached_property
     def parts(self) -> dict[str, str]:
         """Names that stand for an expression."""
         named = {**self.define, **self.observables}
@@ -84,7 +84,7 @@ class Names:
     ) -> None:
         """Read an expression and look all of its names up."""
         try:
-            found = self.leaves(parse(text), ())
+            found = self.leaves_of(text)
         except ModelError as error:
             raise EntryError(address, str(error)) from None
         if only_parameters:
@@ -102,6 +102,24 @@ class Names:
             )
         if PERIOD in found and PERIOD not in (*self.states, *self.parameters):
             raise EntryError(address, "the period T can only stand in the symmetry")
+
+    def leaves_of(self, text: str) -> frozenset[str]:
+        """Return the states, parameters and t that an expression depends on; each text is read once.
+
+        Modes of a structure differ in few of their rates.
+
+        Raises
+        ------
+        ModelError
+            If it is no expression, or for a name that is not known.
+        """
+        if text not in self._leaves:
+            self._leaves[text] = frozenset(self.leaves(parse(text), ()))
+        return self._leaves[text]
+
+    @cached_property
+    def _leaves(self) -> dict[str, frozenset[str]]:
+        return {}
 
     def leaves(self, tree: ast.expr, above: tuple[str, ...]) -> set[str]:
         """Return the states, parameters and t that an expression depends on."""

@@ -43,16 +43,16 @@ def joined_modes(description: Description) -> Mapping[str, str]:
 
 
 class _Key:
-    """A description that is equal to others with the same text."""
+    """A description that is equal to others with the same motion: titles and quantities join nothing."""
 
     def __init__(self, description: Description) -> None:
-        self.description = description
+        self.description, self.motion = description, description.motion
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Key) and self.description.text == other.description.text
+        return isinstance(other, _Key) and self.motion == other.motion
 
     def __hash__(self) -> int:
-        return hash(self.description.text)
+        return hash(self.motion)
 
 
 @lru_cache(maxsize=64)

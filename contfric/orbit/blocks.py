@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, helper, indices, kernel, matrix, vector
+from contfric.compiled import blocks, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace, segment_rows
 from contfric.orbit.holds import NO_PIN
@@ -42,13 +42,16 @@ def rates_at_joint(functions, layout, i, after, p, which, workspace, rows):  # t
 
 @kernel(
     types.boolean(
-        *(FlowType, LayoutType, matrix, vector, indices, blocks, blocks, blocks, blocks, matrix)
+        *(FlowType, LayoutType, matrix, vector, indices, i8),
+        *(blocks, blocks, blocks, blocks, matrix),
     )
 )
-def linearise(functions, layout, z, p, which, a, b, c, r, close):  # type: ignore[no-untyped-def]
+def linearise(functions, layout, z, p, which, at_joints, a, b, c, r, close):  # type: ignore[no-untyped-def]
     """Fill the blocks of the full Jacobian for use outside of the engine.
 
-    Differentiated by the parameters ``which``, as many as ``c`` has columns.
+    Differentiated by the parameters ``which``, as many as ``c`` has columns. The rates at exits are those at
+    the joints where that is asked for (``at_joints`` is 1): these are the derivatives of the equations where
+    they hold, and more exact there. They change in another way, as what is left of the equations does.
     """
     count, m = z.shape
     free = c.shape[2]
@@ -62,7 +65,7 @@ def linearise(functions, layout, z, p, which, a, b, c, r, close):  # type: ignor
         after = z[i + 1] if i + 1 < count else workspace.last
         worst = segment_rows(functions, layout, i, m, z[i], after, p, which, workspace, rows)
         fine = fine and math.isfinite(worst)
-        if layout.pins[i] == NO_PIN:
+        if layout.pins[i] == NO_PIN and at_joints != 0:
             rates_at_joint(functions, layout, i, after, p, which, workspace, rows)
         for j in range(m):
             for k in range(m):

@@ -31,9 +31,18 @@ def jacobian_blocks(
 
 
 def linearised(
-    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
+    system: System,
+    joints: FloatArray,
+    vector: FloatArray,
+    parameters: bool | Sequence[int] = True,
+    at_joints: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the blocks and, as the last one, what is left of every equation, shape (N m,)."""
+    """Return the blocks and, as the last one, what is left of every equation, shape (N m,).
+
+    Parameters
+    ----------
+    at_joints : take the rates at exits at the joints: more exact where the equations hold, and only there
+    """
     from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
@@ -42,15 +51,24 @@ def linearised(
     which = np.array(chosen, dtype=np.int64)
     c, r = np.empty((count, m, len(which))), np.empty((count, m, 1))
     close = np.empty((m, m))
-    linearise(system.functions(), system.layout, joints, vector, which, a, b, c, r, close)
+    linearise(
+        system.functions(), system.layout, joints, vector, which, int(at_joints), a, b, c, r, close
+    )
     return a, b, c, close, r.ravel()
 
 
 def equations_at(
-    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
+    system: System,
+    joints: FloatArray,
+    vector: FloatArray,
+    parameters: bool | Sequence[int] = True,
+    at_joints: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters)."""
-    a, b, c, close, correction = linearised(system, joints, vector, parameters)
+    """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters).
+
+    Where the equations do not hold these are the derivatives of the residuals only without ``at_joints``.
+    """
+    a, b, c, close, correction = linearised(system, joints, vector, parameters, at_joints)
     return -correction, stacked(a, b, close), c.reshape(joints.size, -1)
 
 

@@ -127,7 +127,7 @@ def test_jacobian_agrees_with_differences() -> None:
         c, r = np.empty((n, m, len(found.vector))), np.empty((n, m, 1))
         which = np.arange(len(found.vector))
         at = system.functions(), system.layout, joints, found.vector, which
-        linearise(*at, a, b, c, r, np.empty((m, m)))
+        linearise(*at, 1, a, b, c, r, np.empty((m, m)))
         return -r.ravel()
 
     for k in range(found.joints.size):

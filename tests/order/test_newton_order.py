@@ -29,7 +29,19 @@ def newton_step(orbit: cf.Orbit) -> np.ndarray:
     c, r = np.empty((count, m, size)), np.empty((count, m, 1))
     close = np.empty((m, m))
     which = np.arange(size)
-    args = (system.functions(), system.layout, orbit.joints, orbit.vector, which, a, b, c, r, close)
+    args = (
+        system.functions(),
+        system.layout,
+        orbit.joints,
+        orbit.vector,
+        which,
+        1,
+        a,
+        b,
+        c,
+        r,
+        close,
+    )
     assert linearise(*args)
     full = np.zeros((count * m, count * m))
     for i in range(count):
@@ -78,7 +90,7 @@ def test_jacobian_in_the_parameters(name: str) -> None:
         c, r = np.empty((count, m, len(vector))), np.empty((count, m, 1))
         system = orbit.system
         which = np.arange(len(vector))
-        args = (system.functions(), system.layout, orbit.joints, vector, which, a, b, c, r)
+        args = (system.functions(), system.layout, orbit.joints, vector, which, 1, a, b, c, r)
         assert linearise(*args, np.empty((m, m)))
         return -r[:, :, 0], c
 

@@ -215,7 +215,7 @@ def residuals(orbit: cf.Orbit, joints: np.ndarray, vector: np.ndarray) -> np.nda
     right = np.empty((count, m, 1))
     system = orbit.system
     at = system.functions(), system.layout, joints, vector, np.arange(len(vector))
-    linearise(*at, *workspace, right, np.empty((m, m)))
+    linearise(*at, 1, *workspace, right, np.empty((m, m)))
     return -right.ravel()
 
 

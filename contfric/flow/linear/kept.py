@@ -42,8 +42,9 @@ from contfric.flow.linear.system import TERMS, FloatArray, growth, start_waves, 
 
 #: Numbers that a model's memory has, 32 MB: it is taken from the system as it is used.
 NUMBERS = 2**22
-#: Most solutions that are kept, and most matrices.
-_SLOTS, _LADDERS = 64, 32
+#: Most solutions and observables that are kept, and most matrices. Those of one orbit have to have space
+#: together: twenty segments of ten contacts have twenty matrices, and two hundred observables.
+_SLOTS, _LADDERS = 512, 64
 #: Attempts to take the memory, about 50 microseconds: what is kept takes longer to find anew.
 _PATIENCE = 3000
 #: h is at most this over the rate, and at least half of it.
@@ -211,6 +212,8 @@ def find(memory, piece, k, stamp, spare, slots):  # type: ignore[no-untyped-def]
             at = _BEGIN + j * length
             # where it is of another matrix no other slot has this solution
             return at, memory[at + OF] == stamp
+        if memory[_KEYS + 2 * j] == 0.0:  # slots are filled in their order: no other one has been
+            break
     j = int(memory[_NEXT])
     if _BEGIN + j * length == spare:
         j = (j + 1) % slots
