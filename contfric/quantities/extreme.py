@@ -10,6 +10,13 @@ from contfric.models.quantity_texts import WORK, Functional, Parsed, read
 from contfric.quantities.registry import NAMED, Quantity
 
 
+def integrated(quantity: Quantity) -> Functional | None:
+    """Return the functional that a quantity is, if that is made of integrals over all modes alike."""
+    functional = only_functional(quantity.parsed, quantity.model)
+    extreme = functional is None or functional.kind in ("max", "min", WORK)
+    return None if extreme else functional
+
+
 def is_compiled(functional: Functional, model: Model) -> bool:
     """Tell whether compiled code integrates a functional: one expression in all modes, of a plain motion."""
     extreme = functional.kind in ("max", "min", WORK)
@@ -34,7 +41,7 @@ class Peak(NamedTuple):
 def peak_of(quantity: Quantity) -> Peak | None:
     """Return a quantity as an extremum; None if it is anything else."""
     model = quantity.model
-    functional = _only_functional(quantity.parsed, model)
+    functional = only_functional(quantity.parsed, model)
     return None if functional is None else _peak(functional, model)
 
 
@@ -69,7 +76,7 @@ def _in_rows(parsed: Parsed, model: Model) -> bool:
     return True
 
 
-def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
+def only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
     """Return the functional that an expression is, through names of quantities; None if it is more."""
     if parsed is None or not isinstance(parsed.tree, ast.Name):
         return None
@@ -78,6 +85,6 @@ def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
         return parsed.functionals[name]
     own = dict(model.quantities)
     if name in own:
-        return _only_functional(read(own[name]), model)
+        return only_functional(read(own[name]), model)
     text = NAMED[name].text if name in NAMED else ""
-    return _only_functional(read(text.replace("%s", model.states[0])), model) if text else None
+    return only_functional(read(text.replace("%s", model.states[0])), model) if text else None
