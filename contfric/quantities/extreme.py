@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import ast
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from contfric.models.definition import Model
+from contfric.models.definition import FloatArray, Model
 from contfric.models.quantity_texts import WORK, Functional, Parsed, read
 from contfric.quantities.registry import NAMED, Quantity
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+    from contfric.quantities.motion import Directions
 
 
 def integrated(quantity: Quantity) -> Functional | None:
@@ -42,10 +46,11 @@ def peak_of(quantity: Quantity) -> Peak | None:
     """Return a quantity as an extremum; None if it is anything else."""
     model = quantity.model
     functional = only_functional(quantity.parsed, model)
-    return None if functional is None else _peak(functional, model)
+    return None if functional is None else peak_in(functional, model)
 
 
-def _peak(functional: Functional, model: Model) -> Peak | None:
+def peak_in(functional: Functional, model: Model) -> Peak | None:
+    """Return a functional as an extremum; None if it is anything else."""
     if functional.kind not in ("max", "min") or functional.contacts:
         return None
     name, sign = functional.text, 1.0 if functional.kind == "max" else -1.0
@@ -55,6 +60,16 @@ def _peak(functional: Functional, model: Model) -> Peak | None:
         name = model.displacement
     c = model.observable_index.get(name)
     return None if c is None else Peak(c, 1, sign)
+
+
+def moved_peak(peak: Peak, orbit: Orbit, directions: Directions) -> tuple[float, FloatArray] | None:
+    """Return an extremum with its derivatives, shape (D,), by compiled code; None if it is reached twice."""
+    found = orbit.extreme(*peak)
+    if found is None:
+        return None
+    value, on_joints, on_parameters = found
+    slopes = on_joints.ravel() @ directions.joints.reshape(on_joints.size, -1)
+    return value, slopes + on_parameters @ directions.vector
 
 
 def in_rows(quantity: Quantity) -> bool:

@@ -26,7 +26,7 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
-from contfric.quantities.extreme import is_compiled
+from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside
 from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
@@ -69,7 +69,7 @@ class Measuring:
         if asked.kind == WORK:
             return self._work(asked)
         if asked.kind in ("max", "min"):
-            return self._extremum(asked, self.inside.function(asked))
+            return self._peak(asked) or self._extremum(asked, self.inside.function(asked))
         return self.number(*self.smooth(asked))
 
     def smooth(self, asked: Functional) -> tuple[float, FloatArray]:
@@ -213,6 +213,15 @@ class Measuring:
             return sign * self._envelopes(function, where[rows], shares[rows], by_mode)
 
         return self.largest(f"{asked.kind}({asked.text})", sign * values, slopes) * sign
+
+    def _peak(self, asked: Functional) -> Dual | None:
+        """Return the extremum of an observable by compiled code; None where it is reached twice."""
+        orbit, directions = self.motion.orbit, self.motion.directions
+        peak = peak_in(asked, orbit.model)
+        if peak is None or directions is None:
+            return None
+        found = moved_peak(peak, orbit, directions)
+        return None if found is None else self.number(*found)
 
     def _at_joints(self, asked: Functional) -> bool:
         """Tell whether it is the displacement of a model whose motion is cut at its stops, without resets."""
