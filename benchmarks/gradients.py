@@ -34,10 +34,10 @@ CASES: dict[str, tuple[str, str, dict[str, float], str, tuple[float, float]]] = 
 
 
 def seconds(call: Callable[[], Any]) -> float:
-    """Return how long a call takes."""
-    start = time.perf_counter()
+    """Return how long a call takes, in time of the processor."""
+    start = time.process_time()
     call()
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
 def calls(name: str) -> dict[str, Callable[[], Any]]:

@@ -29,8 +29,15 @@ from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import both_sides
 from contfric.curves.ranges import Ranges, ranges_of
-from contfric.curves.trace import largest_step
-from contfric.errors import ConvergenceError, ParameterError, items_of, shown, whole_number
+from contfric.curves.trace import Progress, largest_step
+from contfric.errors import (
+    ConvergenceError,
+    ParameterError,
+    function_of,
+    items_of,
+    shown,
+    whole_number,
+)
 from contfric.models.definition import FloatArray
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.orbit import Orbit
@@ -95,6 +102,11 @@ class Stationary(Held):
     secants: _Secants = field(default_factory=_Secants)
 
     @property
+    def title(self) -> str:
+        """What the orbits of the curve have in common."""
+        return f"{self.quantity.name if self.quantity else ''} extreme"
+
+    @property
     def kind(self) -> int:
         """What is asked of an extremum."""
         from contfric.curves.held_conditions import STATIONARY
@@ -149,6 +161,7 @@ def continue_extremum(
     *,
     max_step: float | None = None,
     max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
 ) -> ExtremumCurve:
     """Continue the orbits at which a quantity is extreme, as one more parameter varies.
 
@@ -170,6 +183,8 @@ def continue_extremum(
         Largest step, as for :func:`contfric.continue_bifurcation`.
     max_points : int
         Most points of each side.
+    progress : callable, optional
+        Called with one line of text now and then.
 
     Raises
     ------
@@ -207,13 +222,16 @@ def continue_extremum(
     box = ranges_of(orbit.model, names, ranges)
     largest = largest_step(max_step, orbit.model)
     whole_number("max_points", max_points, least=2)
-    held, first = _start(orbit, measured, box)
-    found = both_sides(held, first, largest, max_points)
+    function_of("progress", progress)
+    held, first = _start(orbit, measured, box, progress)
+    found = both_sides(held, first, largest, max_points, progress)
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
     return ExtremumCurve(**{**values, "value": float(of_orbit(measured, held.orbit_of(first)))})
 
 
-def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, Point]:
+def _start(
+    orbit: Orbit, quantity: Quantity, box: Ranges, progress: Progress | None
+) -> tuple[Stationary, Point]:
     """Return the problem and its first point: near the orbit, else by fewer parameters first."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
@@ -221,7 +239,7 @@ def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, P
     if not box.contains(here):
         where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
         raise ParameterError(f"the orbit is at {where}, outside of the ranges")
-    near = _nearer(orbit, quantity, box)
+    near = _nearer(orbit, quantity, box, progress)
     held = Stationary(canonical(near).as_half(), quantity, 0.0, box)
     first = held.first()
     if first is None:
@@ -233,12 +251,12 @@ def _start(orbit: Orbit, quantity: Quantity, box: Ranges) -> tuple[Stationary, P
     return held, first
 
 
-def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges) -> Orbit:
+def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges, progress: Progress | None) -> Orbit:
     """Return an orbit next to a point at which the quantity is stationary in all but the last parameter."""
     names, last = box.names[:-1], box.names[-2]
     if len(names) == 1:
         bounds = float(box.low[0]), float(box.high[0])
-        branch = continue_orbit(orbit, last, bounds, stability=False)
+        branch = continue_orbit(orbit, last, bounds, stability=False, progress=progress)
         found = [e for e in branch.extrema(quantity.name) if not e.kink]
         if not found:
             raise ConvergenceError(
@@ -247,8 +265,9 @@ def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges) -> Orbit:
         start = orbit.params[last]
         return min(found, key=lambda e: abs(e.params[last] - start)).orbit
     inner = Ranges(names, box.low[:-1], box.high[:-1])
-    held, first = _start(orbit, quantity, inner)
-    curve = both_sides(held, first, largest_step(None, orbit.model), MOST_POINTS)
+    held, first = _start(orbit, quantity, inner, progress)
+    largest = largest_step(None, orbit.model)
+    curve = both_sides(held, first, largest, MOST_POINTS, progress)
     values = curve.measured(quantity.name)
     turns = np.flatnonzero(np.diff(values[1:]) * np.diff(values[:-1]) <= 0.0) + 1
     if not len(turns):

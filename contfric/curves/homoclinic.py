@@ -17,6 +17,7 @@ from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_trace import continue_quantity
+from contfric.curves.trace import Progress
 from contfric.errors import ParameterError, real_number
 
 
@@ -52,6 +53,7 @@ def continue_homoclinic(
     period: float,
     max_step: float | None = None,
     max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
 ) -> HomoclinicCurve:
     """Continue the end of a branch whose period grows without bound, at a fixed long period.
 
@@ -65,7 +67,7 @@ def continue_homoclinic(
         Where each of them may go.
     period : float
         The bound: the period at which the curve is followed, in units of the model's time.
-    max_step, max_points
+    max_step, max_points, progress
         As for :func:`contfric.continue_bifurcation`.
 
     Raises
@@ -105,6 +107,9 @@ def continue_homoclinic(
     first = next(k for k in inwards if periods[k] <= bound)
     orbit = branch[first]  # the first one from the end that is not too long
     found = continue_quantity(
-        orbit, "period", bound, parameters, ranges, max_step=max_step, max_points=max_points
+        *(orbit, "period", bound, parameters, ranges),
+        max_step=max_step,
+        max_points=max_points,
+        progress=progress,
     )
     return HomoclinicCurve(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -105,6 +105,11 @@ class Held:
         return np.array([self.orbit.model.index_of(n) for n in self.box.names], dtype=np.int64)
 
     @property
+    def title(self) -> str:
+        """What the orbits of the curve have in common."""
+        return f"{self.quantity.name} = {self.value:g}" if self.quantity else ""
+
+    @property
     def system(self) -> System:
         """Boundary-value problem of the orbits."""
         return self.orbit.system

@@ -21,8 +21,14 @@ from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
 from contfric.curves.ranges import Box, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
-from contfric.curves.trace import largest_step
-from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
+from contfric.curves.trace import Progress, largest_step
+from contfric.errors import (
+    ConvergenceError,
+    ParameterError,
+    function_of,
+    real_number,
+    whole_number,
+)
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
@@ -42,6 +48,7 @@ def continue_quantity(
     *,
     max_step: float | None = None,
     max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
 ) -> QuantityCurve:
     """Continue the orbits on which a quantity has one value, in two parameters.
 
@@ -64,6 +71,8 @@ def continue_quantity(
         Largest step, as for :func:`contfric.continue_bifurcation`.
     max_points : int
         Most points of each side.
+    progress : callable, optional
+        Called with one line of text now and then.
 
     Raises
     ------
@@ -93,7 +102,8 @@ def continue_quantity(
     box = box_of(orbit.model, parameters, ranges)
     largest = largest_step(max_step, orbit.model)
     whole_number("max_points", max_points, least=2)
-    start = _start(orbit, held_quantity, value, box)
+    function_of("progress", progress)
+    start = _start(orbit, held_quantity, value, box, progress)
     held = Held(start, held_quantity, value, box)
     first = held.first()
     if first is None:
@@ -102,12 +112,14 @@ def continue_quantity(
             f"depend on {' and '.join(box.names)}, or be extreme there",
             start,
         )
-    return both_sides(held, first, largest, max_points)
+    return both_sides(held, first, largest, max_points, progress)
 
 
-def both_sides(held: Held, first: Point, largest: float, max_points: int) -> QuantityCurve:
+def both_sides(
+    held: Held, first: Point, largest: float, max_points: int, progress: Progress | None = None
+) -> QuantityCurve:
     """Trace a curve from its first point both ways."""
-    points, arc, ends = trace_both(held, first, largest, max_points)
+    points, arc, ends = trace_both(held, first, largest, max_points, progress)
     directions = held.orbit.model.directions
     return QuantityCurve(
         held.quantity.name if held.quantity else "",
@@ -124,12 +136,12 @@ def both_sides(held: Held, first: Point, largest: float, max_points: int) -> Qua
 
 
 def trace_both(
-    held: Held, first: Point, largest: float, max_points: int
+    held: Held, first: Point, largest: float, max_points: int, progress: Progress | None = None
 ) -> tuple[list[Point], FloatArray, tuple[CurveEnd, CurveEnd]]:
     """Return the points of a curve in one direction, with arclengths, and why it ends at both."""
-    ahead = HeldSide(held, [first], largest)
+    ahead = HeldSide(held, [first], largest, progress)
     ahead.trace(max_points)
-    behind = HeldSide(held, [first.reversed()], largest)
+    behind = HeldSide(held, [first.reversed()], largest, progress)
     if ahead.end.reason in (CurveEndReason.CLOSED, CurveEndReason.INTERRUPTED):
         behind.end = CurveEnd(ahead.end.reason)
     else:
@@ -140,7 +152,9 @@ def trace_both(
     return points, arc - arc[0], (behind.end, ahead.end)
 
 
-def _start(orbit: Orbit, quantity: Quantity, value: float, box: Box) -> Orbit:
+def _start(
+    orbit: Orbit, quantity: Quantity, value: float, box: Box, progress: Progress | None
+) -> Orbit:
     """Return an orbit on the curve: the given one, or one of a branch through it."""
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
@@ -154,8 +168,9 @@ def _start(orbit: Orbit, quantity: Quantity, value: float, box: Box) -> Orbit:
     seen: list[str] = []
     for k, name in enumerate(box.names):
         bounds = float(box.low[k]), float(box.high[k])
+        stop_at = {quantity.name: value}
         branch = continue_orbit(
-            orbit, name, bounds, stability=False, stop_at={quantity.name: value}
+            orbit, name, bounds, stability=False, stop_at=stop_at, progress=progress
         )
         stopped = [
             i for i, end in zip((0, -1), branch.ends, strict=True) if end.reason is EndReason.STOP
@@ -177,6 +192,7 @@ class HeldSide:
     held: Held
     points: list[Point]
     largest: float
+    progress: Progress | None = None
     end: CurveEnd = field(default_factory=lambda: CurveEnd(CurveEndReason.POINTS))
 
     def trace(self, most: int) -> None:
@@ -185,6 +201,7 @@ class HeldSide:
         try:
             while step is not None and len(self.points) < most:
                 step = self._advance(step, most)
+                self._say()
         except KeyboardInterrupt:
             self.end = CurveEnd(CurveEndReason.INTERRUPTED)
 
@@ -204,6 +221,14 @@ class HeldSide:
             self.end = CurveEnd(reason)
             return None
         return found.step
+
+    def _say(self) -> None:
+        """Say how far it is, if anybody listens."""
+        if self.progress is None:
+            return
+        pairs = zip(self.held.box.names, self.points[-1].w, strict=True)
+        where = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
+        self.progress(f"{self.held.title}: {len(self.points)} points, {where}")
 
     def _returned(self) -> bool:
         """Tell whether the last step has passed the start again, in its direction.

@@ -29,6 +29,7 @@ from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
 from contfric.curves.ranges import Box
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
+from contfric.curves.trace import Progress
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -62,6 +63,11 @@ class OnCircle(Held):
     """The condition of a curve of NS, in place of a quantity that is held."""
 
     box: Box
+
+    @property
+    def title(self) -> str:
+        """What the orbits of the curve have in common."""
+        return Kind.NS.value
 
     def defects(self, orbit: Orbit) -> Defects:
         """Return log(mu_1 mu_2) and its row."""
@@ -102,7 +108,11 @@ def angle_of(orbit: Orbit) -> float:
 
 
 def continue_torus(
-    bifurcation: Bifurcation, box: Box, largest: float, max_points: int = MOST_POINTS
+    bifurcation: Bifurcation,
+    box: Box,
+    largest: float,
+    max_points: int = MOST_POINTS,
+    progress: Progress | None = None,
 ) -> Curve:
     """Continue an NS in two parameters, both ways.
 
@@ -124,7 +134,7 @@ def continue_torus(
     first = held.first()
     if first is None:
         raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
-    return _joined(held, *trace_both(held, first, largest, max_points))
+    return _joined(held, *trace_both(held, first, largest, max_points, progress))
 
 
 def _joined(

@@ -19,7 +19,13 @@ from contfric.curves.problem import Problem, check_start, problem_of
 from contfric.curves.ranges import box_of
 from contfric.curves.side import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
 from contfric.curves.special import CurveEnd, CurveEndReason
-from contfric.errors import ConvergenceError, ParameterError, real_number, whole_number
+from contfric.errors import (
+    ConvergenceError,
+    ParameterError,
+    function_of,
+    real_number,
+    whole_number,
+)
 from contfric.models.definition import FloatArray, Model
 from contfric.remember.journal import remembered
 
@@ -59,6 +65,8 @@ def continue_bifurcation(
         of the model by default, 0.01 if it declares none.
     max_points : int
         Most points of each side; a curve that reaches it says so.
+    progress : callable, optional
+        Called with one line of text now and then.
 
     Raises
     ------
@@ -90,11 +98,12 @@ def continue_bifurcation(
     box = box_of(model, parameters, ranges)
     largest = largest_step(max_step, model)
     whole_number("max_points", max_points, least=2)
+    function_of("progress", progress)
     if bifurcation.kind is Kind.NS:
         from contfric.curves.torus import continue_torus
 
         check_start(bifurcation, box)
-        return continue_torus(bifurcation, box, largest, max_points)
+        return continue_torus(bifurcation, box, largest, max_points, progress)
     problem = problem_of(bifurcation, box)
     problem, start, border = start_of_curve(problem, bifurcation, largest)
     ahead = trace_curve_side(problem, start, border, largest, max_points, progress, keep=True)

@@ -1,42 +1,84 @@
 """Derivative of the slide with respect to damping: a response to its own velocity.
 
 The equation differentiated with respect to zeta is ``x'' + 2 zeta x' + x = -2 v``. With the velocity of the
-slide, ``v = v0 C - L G + Re sum a_k (..)``, this is a sum of convolutions with the kernel G: divided
-differences of the exponential over repeated roots (:mod:`contfric.flow.response`). It is linear in
-the load L, in v0 and in the amplitudes ``a_k e^{i k Omega t0}`` of the excitation.
+slide, ``v = v0 C - L G + Re sum a_k (..)``, this is a sum of convolutions with the kernel G, linear in the
+load L, in v0 and in the amplitudes ``a_k e^{i k Omega t0}`` of the excitation. With a dot for the derivative
+by d, ``beta^2 = 1 - zeta^2`` and the response P to ``e^{i w r}`` (:mod:`contfric.flow.response`),
+
+    G*G = (G - d (G' + zeta G)) / (2 beta^2),        (G*G)' = d G / 2 - zeta G*G,
+    (G*G)'' = G - 2 zeta (G*G)' - G*G,               G*P = (P - (G*G)' - (2 zeta + i w) G*G) / D,
+
+where ``D = 1 - w^2 + 2 i zeta w``; the last one is the divided difference ``exp_d[a, b, a, b, i w]`` by its
+recurrence. For short slides, near a resonance and beyond critical damping these cancel, and the divided
+differences are computed as such.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from contfric.compiled import allocating_helper
+from contfric.compiled import allocating_helper, helper
 from contfric.flow.motion import OMEGA, ZETA
-from contfric.flow.response import divided_exponentials, roots
+from contfric.flow.response import divided_exponentials, forced, free, roots
+
+#: Least beta d: below it the difference in G*G, of size d^3 made of terms d, loses more than two bits.
+_LONG = 1.0
+#: Least ``|D| d / w``: the rounding of P, of size d^2, grows by w / |D|; the displacement has the size d^3.
+_APART = 0.5
+
+
+@helper
+def plain_convolutions(zeta, d):  # type: ignore[no-untyped-def]
+    """Return G*G with its first and second derivative by d, by its closed form."""
+    g, c, _ = free(zeta, d)
+    g2 = (g - d * (c + zeta * g)) / (2.0 * (1.0 - zeta) * (1.0 + zeta))
+    g2_1 = 0.5 * d * g - zeta * g2
+    return g2, g2_1, g - 2.0 * zeta * g2_1 - g2
+
+
+@allocating_helper
+def convolutions(zeta, w, d):  # type: ignore[no-untyped-def]
+    """Return G*G with its first and second derivative by d, and G*P, by divided differences."""
+    a, b = roots(zeta)
+    # by exp_d over the repeated roots
+    nodes = np.empty(5, dtype=np.complex128)
+    nodes[0], nodes[1], nodes[2], nodes[3], nodes[4] = a, b, a, b, complex(0.0, w)
+    e = divided_exponentials(nodes, d)
+    g2 = e[3]
+    g2_1 = b * e[3] + e[2]
+    return g2.real, g2_1.real, (b * g2_1 + a * e[2] + e[1]).real, e[4]
+
+
+@helper
+def is_plain(zeta, w, d):  # type: ignore[no-untyped-def]
+    """Tell whether the closed form of G*P keeps its digits."""
+    return abs(complex(1.0 - w * w, 2.0 * zeta * w)) * d >= _APART * w
 
 
 @allocating_helper
 def damping_response(p, load, v0, first, third, d):  # type: ignore[no-untyped-def]
     """Return d(x, v)/dzeta; ``first`` and ``third`` are complex amplitudes of the harmonics at the start."""
-    w = p[OMEGA]
-    a, b = roots(p[ZETA])
-    # G*G, its slope G*C, and C*C' by exp_d over the repeated roots
-    nodes = np.empty(5, dtype=np.complex128)
-    nodes[0], nodes[1], nodes[2], nodes[3], nodes[4] = a, b, a, b, complex(0.0, w)
-    e = divided_exponentials(nodes, d)
-    q = e[4]
-    g2 = e[3]
-    g2_1 = b * e[3] + e[2]
-    g2_2 = b * g2_1 + a * e[2] + e[1]
-    x = v0 * g2_1 - load * g2
-    v = v0 * g2_2 - load * g2_1
+    zeta, w = p[ZETA], p[OMEGA]
+    plain = (
+        abs(zeta) < 1.0 and d * d * (1.0 - zeta * zeta) >= _LONG * _LONG and is_plain(zeta, w, d)
+    )
+    if plain:
+        g2, g2_1, g2_2 = plain_convolutions(zeta, d)
+        q = complex(0.0, 0.0)
+    else:
+        g2, g2_1, g2_2, q = convolutions(zeta, w, d)
+    x = complex(v0 * g2_1 - load * g2, 0.0)
+    v = complex(v0 * g2_2 - load * g2_1, 0.0)
     for k in range(1, 4, 2):
         turn = first if k == 1 else third
         if turn != 0.0:
             node = complex(0.0, k * w)
-            if k == 3:
-                nodes[4] = node
-                q = divided_exponentials(nodes, d)[4]
+            if plain and is_plain(zeta, k * w, d):
+                moved = forced(zeta, k * w, 0.0, d)
+                rest = complex(moved[0], -moved[2]) - g2_1 - (2.0 * zeta + node) * g2
+                q = rest / complex(1.0 - (k * w) ** 2, 2.0 * zeta * k * w)
+            elif k == 3 or plain:
+                q = convolutions(zeta, k * w, d)[3]
             q1 = node * q + g2
             q2 = node * q1 + g2_1
             x += turn * q1

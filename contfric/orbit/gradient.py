@@ -90,9 +90,9 @@ def gradient_of(orbit: Orbit, name: str) -> Gradient:
     found = differentiated(quantity, orbit, by_parameters(orbit))
     names = orbit.model.parameter_names
     notes = (*found.kinks, *_events(orbit))
-    return Gradient(
-        name, found.value, _named(names, found.ahead), _named(names, found.behind), notes
-    )
+    ahead = _named(names, found.ahead)
+    behind = ahead if found.behind is found.ahead else _named(names, found.behind)
+    return Gradient(name, found.value, ahead, behind, notes)
 
 
 def by_parameters(orbit: Orbit) -> Directions:
@@ -136,14 +136,14 @@ def joint_sensitivities(orbit: Orbit) -> FloatArray:
 
 
 def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:
-    return {name: float(slope) for name, slope in zip(names, slopes, strict=True)}
+    return dict(zip(names, slopes.tolist(), strict=True))
 
 
 def _events(orbit: Orbit) -> tuple[str, ...]:
     """Return the margins that vanish: orbits of the signature exist on one side only."""
+    tests = orbit.system.tests
     return tuple(
-        f"the orbit is at an event: the {test.margin.value} margin at {test.surface} of segment "
-        f"{test.segment + 1} vanishes, and orbits of this signature exist on one side"
-        for test, margin in zip(orbit.system.tests, orbit.margins, strict=True)
-        if abs(margin) < _AT_EVENT
+        f"the orbit is at an event: the {tests[k].margin.value} margin at {tests[k].surface} of segment "
+        f"{tests[k].segment + 1} vanishes, and orbits of this signature exist on one side"
+        for k in np.flatnonzero(np.abs(orbit.margins) < _AT_EVENT)
     )

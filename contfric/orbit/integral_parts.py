@@ -93,6 +93,7 @@ class IntegralWorkspace(NamedTuple):
     gradient : of an output by time, states and parameters
     signs : least and largest noted arguments, shape (noted, 2)
     data, values_only : outputs at the nodes of a part, shapes (L, nodes, C) and (L, nodes, 1)
+    wholes : outputs at the nodes of each segment as one part, shape (segments, L, nodes, 1)
     row : integral over a segment and its gradient, shape (L, C)
     least : sizes below which values are rounding, shape (L,)
     waiting : parts of a segment that are to be resolved
@@ -108,6 +109,7 @@ class IntegralWorkspace(NamedTuple):
     signs: FloatArray
     data: FloatArray
     values_only: FloatArray
+    wholes: FloatArray
     row: FloatArray
     least: FloatArray
     waiting: FloatArray
@@ -144,6 +146,7 @@ def integral_workspace(tape, whole, m, parameters, which, none, exact, columns):
         np.empty((tape.noted.shape[0], 2)),
         np.empty((outputs, NODES, columns)),
         np.empty((outputs, NODES, 1)),
+        np.empty((whole, outputs, NODES, 1)),
         np.empty((outputs, columns)),
         np.zeros(outputs),
         np.empty((DEEPEST + 2, SIZES + outputs)),

@@ -52,12 +52,13 @@ TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
 
 
 @helper
-def over_segment(course, level, own):  # type: ignore[no-untyped-def]
+def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
     """Write the integral over a segment, and its gradient; False if it is left to others.
 
-    The values alone, which cost a fraction of the derivatives, say first which parts there are.
+    The values alone, which cost a fraction of the derivatives, say first which parts there are. Those of the
+    whole segment are known.
     """
-    waiting, row, data, light = own.waiting, own.row, own.data, own.values_only
+    waiting, row, data = own.waiting, own.row, own.data
     row[:, :] = 0.0
     waiting[0, LOW], waiting[0, HIGH], waiting[0, DEPTH] = 0, 1, 0
     waiting[0, LIGHT], waiting[0, EXACT] = np.inf, np.inf
@@ -68,7 +69,8 @@ def over_segment(course, level, own):  # type: ignore[no-untyped-def]
     while count > 0:
         count -= 1
         low, high, depth = waiting[count, LOW], waiting[count, HIGH], waiting[count, DEPTH]
-        if not sample_part(course, low, high, own, own.light, light):
+        light = own.values_only if depth > 0 else whole
+        if depth > 0 and not sample_part(course, low, high, own, own.light, light):
             return False
         left, fine = resolved(light, waiting[count], LIGHT, level)
         with_slopes = np.inf
@@ -155,14 +157,18 @@ def enter_segment(functions, whole, i, z, turn, joint, p, own):  # type: ignore[
 
 
 @helper
-def least_sizes(course, own):  # type: ignore[no-untyped-def]
-    """Let the sizes below which values are rounding grow to those of a segment."""
+def least_sizes(course, own, whole):  # type: ignore[no-untyped-def]
+    """Write the values over a segment, and let the sizes below which they are rounding grow to theirs.
+
+    False if a noted argument changes its sign there.
+    """
     own.light.after[0] = -1.0
-    sample_part(course, 0.0, 1.0, own, own.light, own.values_only)
+    smooth = sample_part(course, 0.0, 1.0, own, own.light, whole)
     for j in range(own.least.shape[0]):
         for k in range(NODES):
-            size = abs(own.values_only[j, k, 0]) * (ROUNDING / RESOLVED)
+            size = abs(whole[j, k, 0]) * (ROUNDING / RESOLVED)
             own.least[j] = max(own.least[j], size)
+    return smooth
 
 
 @kernel(
@@ -220,9 +226,10 @@ def integrate(  # type: ignore[no-untyped-def]
         if not lasts > 0.0:
             continue
         if k < length:
-            least_sizes(course, own)
+            if not least_sizes(course, own, own.wholes[i]):
+                return False
             continue
-        if not over_segment(course, level, own):
+        if not over_segment(course, level, own, own.wholes[i]):
             return False
         after = own.equations.behind
         for j in range(out.shape[0]):

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import ast
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from contfric.models.definition import Model
+from contfric.models.definition import FloatArray, Model
 from contfric.models.quantity_texts import WORK, Functional, Parsed, read
 from contfric.quantities.registry import NAMED, Quantity
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
+    from contfric.quantities.motion import Directions
+
+
+def integrated(quantity: Quantity) -> Functional | None:
+    """Return the functional that a quantity is, if that is made of integrals over all modes alike."""
+    functional = only_functional(quantity.parsed, quantity.model)
+    extreme = functional is None or functional.kind in ("max", "min", WORK)
+    return None if extreme else functional
 
 
 def is_compiled(functional: Functional, model: Model) -> bool:
@@ -34,11 +45,12 @@ class Peak(NamedTuple):
 def peak_of(quantity: Quantity) -> Peak | None:
     """Return a quantity as an extremum; None if it is anything else."""
     model = quantity.model
-    functional = _only_functional(quantity.parsed, model)
-    return None if functional is None else _peak(functional, model)
+    functional = only_functional(quantity.parsed, model)
+    return None if functional is None else peak_in(functional, model)
 
 
-def _peak(functional: Functional, model: Model) -> Peak | None:
+def peak_in(functional: Functional, model: Model) -> Peak | None:
+    """Return a functional as an extremum; None if it is anything else."""
     if functional.kind not in ("max", "min") or functional.contacts:
         return None
     name, sign = functional.text, 1.0 if functional.kind == "max" else -1.0
@@ -48,6 +60,16 @@ def _peak(functional: Functional, model: Model) -> Peak | None:
         name = model.displacement
     c = model.observable_index.get(name)
     return None if c is None else Peak(c, 1, sign)
+
+
+def moved_peak(peak: Peak, orbit: Orbit, directions: Directions) -> tuple[float, FloatArray] | None:
+    """Return an extremum with its derivatives, shape (D,), by compiled code; None if it is reached twice."""
+    found = orbit.extreme(*peak)
+    if found is None:
+        return None
+    value, on_joints, on_parameters = found
+    slopes = on_joints.ravel() @ directions.joints.reshape(on_joints.size, -1)
+    return value, slopes + on_parameters @ directions.vector
 
 
 def in_rows(quantity: Quantity) -> bool:
@@ -69,7 +91,7 @@ def _in_rows(parsed: Parsed, model: Model) -> bool:
     return True
 
 
-def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
+def only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
     """Return the functional that an expression is, through names of quantities; None if it is more."""
     if parsed is None or not isinstance(parsed.tree, ast.Name):
         return None
@@ -78,6 +100,6 @@ def _only_functional(parsed: Parsed | None, model: Model) -> Functional | None:
         return parsed.functionals[name]
     own = dict(model.quantities)
     if name in own:
-        return _only_functional(read(own[name]), model)
+        return only_functional(read(own[name]), model)
     text = NAMED[name].text if name in NAMED else ""
-    return _only_functional(read(text.replace("%s", model.states[0])), model) if text else None
+    return only_functional(read(text.replace("%s", model.states[0])), model) if text else None

@@ -25,10 +25,10 @@ import numpy as np
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional
-from contfric.quantities.duals import Dual, Kinks, Number, apply, constant, divide
-from contfric.quantities.extreme import is_compiled
+from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
+from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside
-from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place, moving
+from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
@@ -40,6 +40,9 @@ _APART, _UNITS = 1e-7, 1e8
 _STEPS = 2
 #: Shares over which the bend is a difference: the root of rounding of a rate, and less in a boundary layer.
 _WIDTHS = (1e-4, 1e-6, 1e-8)
+
+#: Integrals over an orbit, with their derivatives, shape (L, D).
+_Totals = tuple[list[float], FloatArray]
 
 
 @dataclass(eq=False)
@@ -65,33 +68,53 @@ class Measuring:
         """Return a functional as a number."""
         if asked.kind == WORK:
             return self._work(asked)
-        function = self.inside.function(asked)
         if asked.kind in ("max", "min"):
-            return self._extremum(asked, function)
+            return self._peak(asked) or self._extremum(asked, self.inside.function(asked))
+        return self.number(*self.smooth(asked))
+
+    def smooth(self, asked: Functional) -> tuple[float, FloatArray]:
+        """Return a functional that is made of integrals, with its derivatives, shape (D,)."""
         if asked.kind in ("amplitude", "phase"):
-            return self._harmonic(asked, function)
-        squared = asked.kind == "rms"
-        found = self._compiled(asked)
-        total = (
-            found[0]
-            if found
-            else self._integral(asked, _squared(function) if squared else function)
-        )
+            return self._harmonic(asked)
+        (total,), (slopes,) = self._compiled(asked) or self._on_panels(asked)
         if asked.kind == "integral":
-            return total
-        mean = _dual(divide(total, self.period()))
-        return _dual(apply("sqrt", mean)) if squared else mean
+            return total, slopes
+        lasts = self._period
+        mean, slopes = total / lasts, (slopes - total / lasts * self.motion.d_period) / lasts
+        if asked.kind == "mean":
+            return mean, slopes
+        root = math.sqrt(mean)
+        return root, _over(slopes, 2.0 * root)
 
     def period(self) -> Dual:
         """Return the period of the orbit."""
-        return self.number(self.motion.orbit.period, self.motion.d_period)
+        return self.number(self._period, self.motion.d_period)
+
+    @cached_property
+    def _period(self) -> float:
+        return self.motion.orbit.period
 
     def _integral(self, asked: Functional, function: Function, size: float = 0.0) -> Dual:
-        value, slopes = integral(self._resolved(self.motion, asked, function, size))
-        return self.number(value, np.zeros(self.motion.count) + slopes)
+        return self.number(*self._on_panel(asked, function, size))
 
-    def _compiled(self, asked: Functional, rate: float = 0.0) -> list[Dual]:
-        """Return what is integrated for a functional by compiled code; nothing where it leaves it to panels.
+    def _on_panel(
+        self, asked: Functional, function: Function, size: float = 0.0
+    ) -> tuple[float, FloatArray]:
+        value, slopes = integral(self._resolved(self.motion, asked, function, size))
+        return value, np.zeros(self.motion.count) + slopes
+
+    def _on_panels(self, asked: Functional) -> _Totals:
+        """Return what :meth:`_compiled` does, by the panels of Python."""
+        function = self.inside.function(asked)
+        functions = [_squared(function) if asked.kind == "rms" else function]
+        if asked.kind in ("amplitude", "phase"):
+            cycles = self._cycles(asked)
+            functions = [_turning(function, self.motion, cycles, wave) for wave in ("cos", "sin")]
+        found = [self._on_panel(asked, each) for each in functions]
+        return [value for value, _ in found], np.array([slopes for _, slopes in found])
+
+    def _compiled(self, asked: Functional, rate: float = 0.0) -> _Totals | None:
+        """Return what is integrated for a functional by compiled code; None where it leaves it to panels.
 
         Parameters
         ----------
@@ -99,23 +122,20 @@ class Measuring:
         """
         orbit, directions = self.motion.orbit, self.motion.directions
         if not is_compiled(asked, orbit.model):
-            return []
-        which, d_moving = moving(self.motion.d_vector)
-        found = orbit.integrals(
-            self.inside.tape(asked), rate, None if directions is None else which
-        )
+            return None
+        which = None if directions is None else directions.moving[0]
+        found = orbit.integrals(self.inside.tape(asked), rate, which)
         if found is None:
-            return []
+            return None
+        values = found.values.tolist()
         if directions is None:
-            return [self.number(value, np.empty(0)) for value in found.values]
-        by_joints = found.on_joints.reshape(len(found.values), -1)
+            return values, np.empty((len(values), 0))
+        by_joints = found.on_joints.reshape(len(values), -1)
         slopes = by_joints @ directions.joints.reshape(-1, self.motion.count)
-        slopes += found.on_parameters[:, :-1] @ d_moving
+        slopes += found.on_parameters[:, :-1] @ directions.moving[1]
         if rate:
-            slopes -= found.on_parameters[:, -1:] * (rate / orbit.period * self.motion.d_period)
-        if not math.isfinite(float(slopes.sum())):
-            return []
-        return [self.number(value, own) for value, own in zip(found.values, slopes, strict=True)]
+            slopes -= found.on_parameters[:, -1:] * (rate / self._period * self.motion.d_period)
+        return (values, slopes) if math.isfinite(float(slopes.sum())) else None
 
     def _work(self, asked: Functional) -> Dual:
         """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
@@ -141,7 +161,26 @@ class Measuring:
 
     # ---------------------------------------------------------------------------- harmonics
 
-    def _harmonic(self, asked: Functional, function: Function) -> Dual:
+    def _harmonic(self, asked: Functional) -> tuple[float, FloatArray]:
+        scale, d_period = 2.0 / self._period, self.motion.d_period
+        rate = 2.0 * math.pi * self._cycles(asked) / self._period
+        totals, slopes = self._compiled(asked, rate) or self._on_panels(asked)
+        a, b = scale * totals[0], -scale * totals[1]
+        d_a = scale * slopes[0] - a / self._period * d_period
+        d_b = -scale * slopes[1] - b / self._period * d_period
+        size = math.hypot(a, b)
+        if asked.kind == "amplitude":
+            return size, _over(a * d_a + b * d_b, size)
+        return math.atan2(b, a), _over(a * d_b - b * d_a, size**2)
+
+    def _cycles(self, asked: Functional) -> int:
+        """Return the number of waves of a harmonic in the period of the orbit.
+
+        Raises
+        ------
+        ParameterError
+            If the orbit does not have this harmonic.
+        """
         orbit = self.motion.orbit
         cycles = asked.harmonic * (1 if orbit.model.autonomous else orbit.periods)
         if abs(cycles - round(cycles)) > 1e-9:
@@ -149,17 +188,7 @@ class Measuring:
                 f"{asked.kind}({asked.text}, {asked.harmonic:g}): an orbit of {orbit.periods} "
                 f"period(s) has the harmonics 1/{orbit.periods}, 2/{orbit.periods}, ... of the excitation"
             )
-        scale = divide(2.0, self.period())
-        parts = self._compiled(asked, 2.0 * math.pi * round(cycles) / orbit.period) or [
-            self._integral(asked, _turning(function, self.motion, round(cycles), wave))
-            for wave in ("cos", "sin")
-        ]
-        a, b = _dual(parts[0] * scale), -_dual(parts[1] * scale)
-        if asked.kind == "amplitude":
-            return _dual(apply("sqrt", a * a + b * b))
-        square = a.values**2 + b.values**2
-        slopes = (a.values / square)[:, None] * b.slopes - (b.values / square)[:, None] * a.slopes
-        return Dual(np.arctan2(b.values, a.values), slopes)
+        return round(cycles)
 
     # ------------------------------------------------------------------------------ extrema
 
@@ -184,6 +213,15 @@ class Measuring:
             return sign * self._envelopes(function, where[rows], shares[rows], by_mode)
 
         return self.largest(f"{asked.kind}({asked.text})", sign * values, slopes) * sign
+
+    def _peak(self, asked: Functional) -> Dual | None:
+        """Return the extremum of an observable by compiled code; None where it is reached twice."""
+        orbit, directions = self.motion.orbit, self.motion.directions
+        peak = peak_in(asked, orbit.model)
+        if peak is None or directions is None:
+            return None
+        found = moved_peak(peak, orbit, directions)
+        return None if found is None else self.number(*found)
 
     def _at_joints(self, asked: Functional) -> bool:
         """Tell whether it is the displacement of a model whose motion is cut at its stops, without resets."""
@@ -267,6 +305,11 @@ class Measuring:
         joints, vector = self.motion.orbit.joints, self.motion.orbit.vector
         nothing = np.zeros((*joints.shape, 1)), np.zeros((len(vector), 1))
         return Motion(self.motion.orbit, Directions(*nothing))
+
+
+def _over(slopes: FloatArray, divisor: float) -> FloatArray:
+    """Divide derivatives by a number; one that is 0 stays 0, divided by 0 too."""
+    return slopes / divisor if divisor else np.where(slopes == 0.0, 0.0, slopes * np.inf)
 
 
 def _dual(number: Number) -> Dual:

@@ -50,6 +50,11 @@ class Directions:
     joints: FloatArray
     vector: FloatArray
 
+    @cached_property
+    def moving(self) -> tuple[IndexArray, FloatArray]:
+        """The parameters that move, and how."""
+        return moving(self.vector)
+
 
 class Place:
     """Where a function of time is evaluated: at shares of one segment, or of several.

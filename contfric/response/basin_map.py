@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.base.memory import must_fit
-from contfric.chaos.running import Progress, check_executor
+from contfric.chaos.running import Progress, check_executor, duration
 from contfric.chaos.status import Motion
 from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.work import Work
@@ -63,6 +64,15 @@ class _Job:
     def tile(self, attractors: Attractors, chosen: IntArray) -> BasinTile:
         targets, states = attractors.targets, self.states[chosen]
         return BasinTile(self.model, self.vector, targets, self.time, states, self.periods)
+
+    def foretell(self, count: int, seconds: float) -> None:
+        """Say how long all starts will take, by some that took so many seconds."""
+        if self.progress is not None:
+            total = len(self.states)
+            self.progress(
+                f"basins: {count} starts took {duration(seconds)}, all {total} take about "
+                f"{duration(seconds * total / count)} of one processor"
+            )
 
     def parts(self, chosen: IntArray) -> list[IntArray]:
         return [chosen[k : k + self.side] for k in range(0, len(chosen), self.side)]
@@ -239,14 +249,21 @@ def _unknown(rows: BasinRows) -> IntArray:
 
 
 def _find_by_seeds(job: _Job, attractors: Attractors) -> None:
-    """Find the orbits of some starts, spread over the grid."""
+    """Find the orbits of some starts, spread over the grid.
+
+    What no orbit catches is followed to the end, and then for its exponent, which takes many times as long as
+    to find the orbit. So the first one is found before any start is followed.
+    """
     count = len(job.states)
     spread = np.floor(np.mod(_GOLDEN * np.arange(1, _SEEDS + 1), 1.0) * count).astype(np.int64)
     chosen = np.unique(spread)
     left = chosen
     while len(left):
-        rows = compute_basin_tile(job.tile(attractors, left))
-        left = left[_unknown(rows)]
+        if attractors.orbits:
+            began = monotonic()
+            rows = compute_basin_tile(job.tile(attractors, left))
+            job.foretell(len(left), monotonic() - began)
+            left = left[_unknown(rows)]
         while len(left) and not attractors.search(job.states[left[0]], job.time):
             left = left[1:]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.chaos.rows import new_stop, starting, until_interrupted
+from contfric.chaos.running import Progress
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.starts import displaced
@@ -42,6 +43,7 @@ def collect(
     vectors: FloatArray,
     starts: tuple[FloatArray, FloatArray, IntArray, IntArray],
     stop: IntArray | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Points, Ends]:
     """Follow solutions and return their points on a section, and what they came to.
 
@@ -52,6 +54,7 @@ def collect(
         that each lies on, as bits; of the states only the first counts if they are carried over
     stop : shape (1,); another thread writes a 1 to it to end the computation. Without it the solutions are
         followed in a thread, and Ctrl-C ends them.
+    progress : called with the number of points whenever there is no more space for them
     """
     from contfric.response.section import cut_solutions
 
@@ -87,6 +90,8 @@ def collect(
         if how.carried and more and not _goes_on(int(ends.outcomes[done - 1])):
             carried = _fresh(model, vectors[done], carried)
         else:
+            if progress is not None:
+                progress(f"{len(points.times)} points")
             points = _longer(points)
         state = carried.copy() if how.carried else state
     return points.first(int(ends.upto[-1]) if count else 0), ends

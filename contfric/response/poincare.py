@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from contfric.chaos.running import Progress
 from contfric.errors import (
+    function_of,
     mapping_of,
     real_number,
 )
@@ -34,6 +36,7 @@ def poincare(
     time: float = 0.0,
     periods: float = 1000.0,
     transient: float = 100.0,
+    progress: Progress | None = None,
 ) -> Returns:
     """Collect the points of one solution on a section: a Poincare section and its return map.
 
@@ -46,6 +49,7 @@ def poincare(
     state, time : initial condition; by default displaced from rest at time 0
     periods, transient : periods of the excitation (units of time without one) of which points are
         collected, and before that
+    progress : called with one line of text now and then
 
     Raises
     ------
@@ -64,10 +68,13 @@ def poincare(
     cut = section_of(model, section, sense)
     vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
     y, begins = checked_state(model, vector, state), real_number("time", time)
+    function_of("progress", progress)
     skipped = real_number("transient", transient, least=0.0)
     how = Following(skipped, skipped + positive("periods", periods), 0.0, _ALL, 0)
     at, one = np.array([begins]), np.array([-1], dtype=np.int64)
-    points, ends = collect(model, cut, how, vector[None], (at, y[None], one, 0 * one))
+    points, ends = collect(
+        model, cut, how, vector[None], (at, y[None], one, 0 * one), None, progress
+    )
     outcome = list(Outcome)[int(ends.outcomes[0])]
     if outcome is Outcome.APERIODIC and _repeated(model, model.view(vector).period, points):
         outcome = Outcome.PERIODIC

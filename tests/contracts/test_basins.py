@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.response import targets
+from contfric.response import basin_map, targets
 from contfric.study.result import RunStatus
 
 #: Two images of an asymmetric orbit, and a symmetric one, coexist.
@@ -104,6 +105,23 @@ def test_chaos_is_named_and_shares_have_intervals() -> None:
     assert (share.name, share.orbit, share.count, share.share) == ("chaotic", -1, 6, 1.0)
     assert 0.5 < share.low < 1.0 and share.high == 1.0
     assert found.where(cf.Motion.CHAOTIC).all()
+
+
+def test_no_start_is_followed_before_an_orbit_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What nothing catches is followed to the end, and for its exponent: minutes of a stiff model."""
+    known, said = [], []
+    computed = basin_map.compute_basin_tile
+
+    def counted(task: Any, *rest: Any) -> Any:
+        known.append(len(task.targets.key))
+        return computed(task, *rest)
+
+    monkeypatch.setattr(basin_map, "compute_basin_tile", counted)
+    cf.basins("coulomb", GRID, THREE, progress=said.append)
+    assert known and min(known) > 0
+    assert any(
+        re.search(r"\d+ starts took .*, all \d+ take about .* of one processor", t) for t in said
+    )
 
 
 def test_escaping_starts_are_named() -> None:

@@ -14,6 +14,7 @@ from contfric.errors import ContfricError
 from contfric.orbit.gradient import by_parameters, joint_sensitivities
 from contfric.orbit.linear import jacobian_blocks, stacked
 from contfric.orbit.solve import refine
+from contfric.quantities import functionals
 from contfric.quantities.motion import Motion
 
 PARAMS = st.fixed_dictionaries(
@@ -147,3 +148,20 @@ def test_nodes_of_all_segments_are_those_of_each(model: str) -> None:
         assert np.array_equal(those[0].values[:1], segment.state[:1])
         ends = [orbit.cycle[(k + 1) % count, 1 + i] for i in range(len(those))]
         assert np.allclose([s.values[2] for s in those], ends, atol=1e-8)
+
+
+@given(PARAMS)
+@settings(max_examples=15)
+def test_extrema_in_expressions_are_those_of_python(params: dict[str, float]) -> None:
+    orbit = found(params)
+    if orbit is None:
+        return
+    for text in ("psi", "max(v) - 2*min(u)", "max(x)*min(v)"):
+        compiled = replace(orbit).gradient(text)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(functionals, "peak_in", lambda *_: None)
+            by_python = replace(orbit).gradient(text)
+        assert compiled.value == pytest.approx(by_python.value, rel=1e-12, abs=1e-12)
+        assert bool(compiled.notes) == bool(by_python.notes)
+        for name, slope in by_python.items():
+            assert compiled[name] == pytest.approx(slope, rel=1e-8, abs=1e-9), (text, name)

@@ -34,7 +34,8 @@ class PoincareTask(Section):
         """Simulate one solution."""
         from contfric.response.poincare import poincare
 
-        return poincare(job.study.model, job.study.params, **self.options())
+        told = job.told(self.name)
+        return poincare(job.study.model, job.study.params, progress=told, **self.options())
 
     def entry(self, found: Returns) -> dict[str, Any]:
         """Return the section and how the solution ended."""

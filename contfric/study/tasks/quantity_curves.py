@@ -124,7 +124,9 @@ class HoldTask(QuantityCurveTask):
 
         one, other = self.parameters
         start = job.found["orbit"], self.quantity, self.value
-        return continue_quantity(*start, (one, other), self._ranges(), **self.options())
+        return continue_quantity(
+            *start, (one, other), self._ranges(), progress=job.say, **self.options()
+        )
 
 
 class ExtremumTask(QuantityCurveTask):
@@ -145,4 +147,4 @@ class ExtremumTask(QuantityCurveTask):
         from contfric.curves.extremum import continue_extremum
 
         start = job.found["orbit"], self.quantity, tuple(self.parameters)
-        return continue_extremum(*start, self._ranges(), **self.options())
+        return continue_extremum(*start, self._ranges(), progress=job.say, **self.options())
