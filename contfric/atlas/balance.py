@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.matching import ROUNDING, same_event, same_location
+from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import Bifurcation, EndReason, Kind
@@ -359,12 +359,9 @@ def _sum_at(diagram: Diagram, value: float) -> int | None:
 
 def orbits_at(branch: Branch, value: float) -> Iterator[Orbit]:
     """Yield the orbits of a branch at a parameter value, solved there: one for each time it takes it."""
-    ahead = branch.values - value
     vector = branch.vector.copy()
     vector[branch.model.index_of(branch.parameter)] = value
-    for k in np.flatnonzero(ahead[:-1] * ahead[1:] < 0.0):
-        share = ahead[k] / (ahead[k] - ahead[k + 1])
-        joints = branch.joints[k] + share * (branch.joints[k + 1] - branch.joints[k])
-        solved = refine(Orbit(branch.system, joints, vector, np.inf), damped=False)
-        nearest = int(k) if share < 0.5 else int(k) + 1
+    for place, guess in guesses(branch, vector, value):
+        solved = refine(guess, damped=False)
+        nearest = int(np.argmin(np.abs(branch.arc - place)))
         yield solved if solved.converged else branch[nearest]

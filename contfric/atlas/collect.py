@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
-from contfric.atlas.matching import same_event, same_location, telling_kind
+from contfric.atlas.matching import ROUNDING, same_event, same_location, telling_kind
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
@@ -78,7 +78,7 @@ def collect(
     asked: Asked,
 ) -> Diagram:
     """Return the diagram, with the mirror image of every asymmetric branch."""
-    computed = _with_proposals(model, computed, events)
+    computed = _with_proposals(model, computed, events, settings)
     branches: list[Branch] = []
     place: dict[int, int] = {}
     image: dict[int, int] = {}
@@ -123,7 +123,26 @@ def _is_relabelling_at_end(event: Event, events: list[Event], settings: Settings
     )
 
 
-def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -> list[Branch]:
+def _best_located(event: Event, settings: Settings) -> Bifurcation:
+    """Return an event as the branch has it on which it is known best.
+
+    Where another curve crosses, the equations of one branch are singular at the event, and those of another
+    one need not be: an event known to the root of rounding may miss its symmetry.
+    """
+    best = event.bifurcation
+    value = best.params[settings.parameter]
+    for member in event.members:
+        gap = abs(member.params[settings.parameter] - value)
+        told = member.located and bool(member.tests) == bool(best.tests)
+        # nearer than rounding they are known alike, and accuracies cost
+        if told and gap > ROUNDING * settings.width and member.accuracy < best.accuracy:
+            best = member
+    return best
+
+
+def _with_proposals(
+    model: Model, computed: list[Branch], events: list[Event], settings: Settings
+) -> list[Branch]:
     """Return the branches with what was proposed at their bifurcations."""
     place, count = {}, 0
     for i, branch in enumerate(computed):  # where a branch will stand among the mirror images
@@ -132,6 +151,7 @@ def _with_proposals(model: Model, computed: list[Branch], events: list[Event]) -
     changed: dict[int, Bifurcation] = {}
     final = {id(b): event.final for event in events if event.final for b in event.members}
     for event in events:
+        event.bifurcation = _best_located(event, settings)
         proposals = tuple(
             p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
         )

@@ -15,7 +15,8 @@ import numpy as np
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import first_end, plane_of, settings_for
+from contfric.atlas.leaving_event import first_end, settings_for
+from contfric.atlas.lines import ways_in_plane
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events import EndReason, Kind, Verdict
@@ -142,7 +143,7 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
 
 def _ways_through(orbit: Orbit, active: int) -> list[FloatArray]:
     """Return directions to look for a family in: where it is the only one of its equations, along it."""
-    found = list(plane_of(orbit, active))
+    found = [away for away, _ in ways_in_plane(orbit, active)]
     if found or not orbit.system.half:
         return found
     vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)

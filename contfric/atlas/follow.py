@@ -20,7 +20,12 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
 from contfric.atlas.faults import fault_of, fault_of_itinerary
 from contfric.atlas.folds import follow_arms, follow_fold
-from contfric.atlas.leaving_event import leave_event, leave_singular, settings_for
+from contfric.atlas.leaving_event import (
+    from_admissible,
+    leave_event,
+    leave_singular,
+    settings_for,
+)
 from contfric.atlas.matching import SAME_SOLUTION, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
@@ -220,6 +225,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
         return False
     branch, ends = _located_by(state, branch, event)
+    branch = from_admissible(branch, candidate.orbit) if not ends else branch
     state.accept(event, candidate.reason, branch)
     for end in ends:
         state.merge(event, end)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
+from contfric.atlas.lines import ways_in_plane
+from contfric.atlas.matching import SAME_SOLUTION
 from contfric.atlas.several_places import opening_together
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
@@ -26,9 +29,10 @@ from contfric.orbit.orbit import Orbit
 #: parameter stands there (a share of the tangent below the second number), it and margins change by the
 #: square of the step, which may be rounding: then a longer one is tried.
 _NEAR_EVENT, _STANDS = (0.01, 0.1), 1e-9
-#: Null vectors where two curves may cross, and the directions between them that are tried: the corrector
-#: reaches a curve from 30 degrees off it.
-_PLANE, _ANGLES = 2, 12
+#: Cosines that miss 1 by less are those of one tangent: of an angle of 1e-4, which the corrector closes.
+_ONE_WAY = 1e-8
+#: Sine of the angle by which a curve may miss the direction it is looked for in.
+_BESIDE = 0.5**0.5
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
@@ -57,11 +61,12 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     if longest is None:
         return leave_singular(state, orbit, event, settings)
     there, side = longest
+    _end_where_it_began(side, side.first, event, settings)
     first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
-    return _from_admissible(assemble(there, settings, side, first), orbit)
+    return assemble(there, settings, side, first)
 
 
-def _from_admissible(branch: Branch, orbit: Orbit) -> Branch:
+def from_admissible(branch: Branch, orbit: Orbit) -> Branch:
     """Return a branch whose first point is the orbit at the event, where the solved one misses a condition.
 
     At an event at which another curve crosses, the first point is solved to the root of rounding only.
@@ -79,7 +84,9 @@ def _longest_way(
     """Return what gets farthest from an event, if any does, and whether the parameter stands there."""
     longest: tuple[Orbit, Side] | None = None
     stands = False
-    for there, side in _ways(orbit, settings, first_step, progress):
+    # where curves cross joints are known to the root of what the parameter is known to
+    known = max(SAME_SOLUTION, event.bifurcation.accuracy**0.5)
+    for there, side in _ways(orbit, settings, first_step, progress, known):
         stands = stands or abs(side.first.slope) < _STANDS * settings.width
         if went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
             longest = there, side
@@ -89,31 +96,59 @@ def _longest_way(
 
 
 def _ways(
-    orbit: Orbit, settings: Settings, first_step: float, progress: Progress | None
+    orbit: Orbit, settings: Settings, first_step: float, progress: Progress | None, known: float
 ) -> Iterator[tuple[Orbit, Side]]:
-    """Yield what is traced in each direction from an orbit at an event."""
+    """Yield what is traced in each direction from an orbit at an event, where joints are known to ``known``.
+
+    What Newton's method finds farther away is no orbit at the event.
+    """
     active = orbit.model.index_of(settings.parameter)
+    farthest = known * (1.0 + float(np.max(np.abs(orbit.joints))))
+    tried: list[Point] = []
     for tangent, slope in directions(orbit, active):
         start = first_point(orbit, settings, tangent, slope)
-        if start is None:
+        if start is None or not np.max(np.abs(start.joints - orbit.joints)) <= farthest:
             continue
+        if any(_is_along(start, known_way, settings) for known_way in tried):
+            continue
+        tried.append(start)
         there = start.orbit(orbit.system, orbit.vector, active)
         for point in (start, start.reversed()):
             yield there, _trace(there, point, settings, first_step, progress)
 
 
+def _is_along(one: Point, other: Point, settings: Settings) -> bool:
+    """Tell whether two starts at one orbit have one tangent: then what is traced from both is the same."""
+    along = np.sum(one.tangent * other.tangent) / len(one.tangent)
+    return bool(1.0 - abs(along + one.slope * other.slope * settings.scale) < _ONE_WAY)
+
+
 def _leave_beside(
-    state: Exploration, orbit: Orbit, away: FloatArray, event: Event, settings: Settings
+    state: Exploration,
+    orbit: Orbit,
+    away: FloatArray,
+    event: Event,
+    settings: Settings,
+    share: float = 0.0,
 ) -> Branch | None:
-    """Trace away from an event at which the new orbit is singular, from a short distance off it."""
+    """Trace away from an event at which the new orbit is singular, from a short distance off it.
+
+    ``share`` is that of the parameter in the direction ``away``, where that is known.
+    """
     active = orbit.model.index_of(settings.parameter)
+    known = ((away, share),) if share else ()
     for distance in _distances(orbit, event):
-        moved = replace(orbit, joints=orbit.joints + distance * orbit.period * away)
-        for tangent, slope in directions(moved, active):
+        vector = orbit.vector.copy()
+        vector[active] += distance * orbit.period * share
+        joints = orbit.joints + distance * orbit.period * away
+        moved = replace(orbit, joints=joints, vector=vector)
+        for tangent, slope in chain(known, directions(moved, active)):
             point = first_point(moved, settings, tangent, slope)
             if point is None:
                 continue
             there = point.orbit(orbit.system, orbit.vector, active)
+            if not _is_beside(there, moved, orbit):
+                continue
             if float(np.sum(away * point.tangent)) < 0.0:
                 point = point.reversed()
             point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
@@ -123,9 +158,20 @@ def _leave_beside(
                     point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)])
                 )
                 origin.arc = 0.0
+                _end_where_it_began(side, origin, event, settings)
                 first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first, origin)
     return None
+
+
+def _is_beside(there: Orbit, moved: Orbit, orbit: Orbit) -> bool:
+    """Tell whether what was solved for from a short distance off an orbit is next to it.
+
+    A curve through the orbit within 45 degrees of the direction passes the guess at less than this. What
+    Newton's method finds farther away lies on another curve, or is the orbit itself.
+    """
+    missed = np.linalg.norm(there.joints - moved.joints)
+    return bool(missed <= _BESIDE * np.linalg.norm(moved.joints - orbit.joints))
 
 
 def _distances(orbit: Orbit, event: Event) -> list[float]:
@@ -151,8 +197,9 @@ def leave_singular(
     if branch is not None:
         return branch
     active = orbit.model.index_of(settings.parameter)
-    for away in (*plane_of(orbit, active), *_line_of(orbit, active, settings)):
-        branch = _leave_beside(state, orbit, away, event, settings)
+    lines = ((away, 0.0) for away in _line_of(orbit, active, settings))
+    for away, slope in chain(ways_in_plane(orbit, active), lines):
+        branch = _leave_beside(state, orbit, away, event, settings, slope)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
@@ -179,16 +226,6 @@ def _line_of(orbit: Orbit, active: int, settings: Settings) -> Iterator[FloatArr
     away = vectors[0] / np.max(np.abs(vectors[0]))
     yield away
     yield -away
-
-
-def plane_of(orbit: Orbit, active: int) -> Iterator[FloatArray]:
-    """Yield directions in the plane of two null vectors; none where the curve has a unique direction."""
-    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    if len(vectors) != _PLANE:
-        return
-    for angle in np.arange(_ANGLES) * (2.0 * np.pi / _ANGLES):
-        away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
-        yield away / np.max(np.abs(away))
 
 
 def _trace(
@@ -218,6 +255,24 @@ def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -
         stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
     here = replace(b, position=0.0, stable_before=None, stable_after=stable)
     return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
+
+
+def _end_where_it_began(side: Side, there: Point, event: Event, settings: Settings) -> None:
+    """Give a side that comes back to the event it began at its second end there.
+
+    At the event orbits of its itinerary begin: the curve is not closed, both of its ends are at one place.
+    Which of them is met last is rounding where a condition vanishes there with its slope.
+    """
+    if side.end.reason is not EndReason.CLOSED:
+        return
+    b, grows = event.bifurcation, side.tip.value > side.before_tip.value
+    side.put_tip(replace(there, arc=side.position))
+    stable: bool | None = False if side_is_bridge(side) else None
+    if settings.stability and not side_is_bridge(side):
+        stable = bool(np.all(np.abs(side.before_tip.mu) < 1.0))
+    before, after = (stable, None) if grows else (None, stable)
+    here = replace(b, position=side.position, stable_before=before, stable_after=after)
+    side.end = End(EndReason[b.kind.name], where(b, settings.parameter), here)
 
 
 def side_is_bridge(side: Side) -> bool:

@@ -154,7 +154,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     mirror = orbit.model.symmetry is not None
     if is_continuum(branch):
         return _in_family(orbit, branch, mirror)
-    for guess in _guesses(branch, orbit, value):
+    for _, guess in guesses(branch, orbit.vector, value):
         solved = refine(guess, damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
@@ -163,8 +163,8 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     return False
 
 
-def _guesses(branch: Branch, orbit: Orbit, value: float) -> Iterator[Orbit]:
-    """Yield guesses for the orbits of a branch at a value, one for each time it takes it.
+def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
+    """Yield guesses for the orbits of a branch at a value, one for each time it takes it, with their places.
 
     By interpolation between its points and the folds between them, near which it is a parabola.
     """
@@ -177,4 +177,5 @@ def _guesses(branch: Branch, orbit: Orbit, value: float) -> Iterator[Orbit]:
             share = 1.0 - max(0.0, 1.0 - share) ** 0.5
         elif folds[k] >= 0:
             share = max(0.0, share) ** 0.5
-        yield replace(branch.between(arc[k] + share * (arc[k + 1] - arc[k])), vector=orbit.vector)
+        place = float(arc[k] + share * (arc[k + 1] - arc[k]))
+        yield place, replace(branch.between(place), vector=vector)

@@ -176,11 +176,12 @@ def _jumps_at_end(before: Point, after: Point) -> bool:
     """Tell whether the parameter changes over a step as if only one of the two slopes were true.
 
     At an event at which another curve crosses the equations are singular, and the tangent is rounding. At a
-    fold the slope changes over the whole step, and its mean lies between those at the ends.
+    fold the slope changes over the whole step, and its mean is nearer to the middle of those at the ends than
+    to either.
     """
-    length, turns = after.arc - before.arc, abs(after.slope - before.slope)
-    mean = (after.value - before.value) / length
-    return min(abs(mean - before.slope), abs(mean - after.slope)) < _LEFT * turns
+    mean = (after.value - before.value) / (after.arc - before.arc)
+    middle = 0.5 * (before.slope + after.slope)
+    return min(abs(mean - before.slope), abs(mean - after.slope)) < abs(mean - middle)
 
 
 def _is_idle(orbit: Orbit, before: Point, point: Point, after: Point, settings: Settings) -> bool:

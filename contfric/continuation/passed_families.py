@@ -8,6 +8,7 @@ a touch, so that the line through two points on one side is at zero before the t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -38,38 +39,57 @@ def with_families(branch: Branch, settings: Settings) -> Branch:
         return branch
     away = np.min(np.abs(mu + 1.0), axis=1)
     near = (away[1:-1] < _TOUCHES) & (away[1:-1] <= away[:-2]) & (away[1:-1] < away[2:])
-    sides = np.min((mu + 1.0).real, axis=1)
-    touches = near & (sides[:-2] * sides[2:] > 0.0) & _may_touch(away, branch.arc)
-    events = [_passed(branch, mu, int(k)) for k in 1 + np.flatnonzero(touches)]
+    events = [_passed(branch, mu, *three) for three in _told_around(branch, away, near)]
     found = [b for b in events if b is not None and not _is_listed(branch, b, settings)]
     return replace(branch, bifurcations=in_order(branch, found)) if found else branch
 
 
-def _may_touch(away: FloatArray, arc: FloatArray) -> NDArray[np.bool_]:
-    """Tell for each inner point of a branch whether a multiplier may be at -1 between its neighbours.
+def _told_around(
+    branch: Branch, away: FloatArray, near: NDArray[np.bool_]
+) -> Iterator[tuple[int, int, int]]:
+    """Yield the nearest points around each least distance from -1 where it is told, and the least between.
+
+    Steps crowd where a multiplier touches -1, and next to the touch its distance from -1 is rounding: neither
+    its sign nor which point is nearest can be told there. Nothing where an end of the branch is as near.
+    """
+    high = 0
+    for k in (1 + np.flatnonzero(near)).tolist():
+        if k < high:  # among the points between the last two
+            continue
+        low, high = k - 1, k + 1
+        while low >= 0 and _is_rounding(branch[low], away[low]):
+            low -= 1
+        while high < len(away) and _is_rounding(branch[high], away[high]):
+            high += 1
+        if low >= 0 and high < len(away):
+            yield low, low + 1 + int(np.argmin(away[low + 1 : high])), high
+
+
+def _may_touch(away: FloatArray, arc: FloatArray) -> bool:
+    """Tell from three points of a branch whether a multiplier may be at -1 between the outer ones.
 
     Examples
     --------
     >>> import numpy as np
     >>> s = np.array([-1.0, 0.2, 1.0])
-    >>> _may_touch(s**2, s).tolist(), _may_touch(4.0 + s**2, s).tolist()
-    ([True], [False])
+    >>> _may_touch(s**2, s), _may_touch(4.0 + s**2, s)
+    (True, False)
     """
-    before, here, after = away[:-2], away[1:-1], away[2:]
-    behind, ahead = np.diff(arc)[:-1], np.diff(arc)[1:]
+    before, here, after = away
+    behind, ahead = np.diff(arc)
     from_left = here * behind <= _RESERVE * (before - here) * ahead
     from_right = here * ahead <= _RESERVE * (after - here) * behind
-    return from_left | from_right
+    return bool(from_left or from_right)
 
 
-def _is_rounding(orbit: Orbit, away: FloatArray) -> bool:
-    """Tell whether distances of a multiplier from -1 are rounding, which a tangential exit magnifies.
+def _is_rounding(orbit: Orbit, away: float) -> bool:
+    """Tell whether the distance of a multiplier from -1 is rounding, which a tangential exit magnifies.
 
     Multipliers have the rates at which segments end as divisors, and these rates are margins.
     """
     exits = [test.margin is Margin.EXIT for test in orbit.system.tests]
     slowest = float(orbit.margins[exits].min(initial=1.0))
-    return bool(np.min(away) * slowest <= UNITS * np.finfo(float).eps)
+    return bool(away * slowest <= UNITS * np.finfo(float).eps)
 
 
 def _is_listed(branch: Branch, event: Bifurcation, settings: Settings) -> bool:
@@ -81,24 +101,33 @@ def _is_listed(branch: Branch, event: Bifurcation, settings: Settings) -> bool:
     )
 
 
-def _passed(branch: Branch, mu: NDArray[np.complex128], k: int) -> Bifurcation | None:
-    """Return the branch point next to a point of a symmetric branch, if it passes a family there."""
-    active = branch.model.index_of(branch.parameter)
-    before, after = branch.values[k - 1], branch.values[k + 1]
-    if _is_rounding(branch[k], np.min(np.abs(mu[[k - 1, k + 1]] + 1.0), axis=1)):
+def _passed(
+    branch: Branch, mu: NDArray[np.complex128], low: int, k: int, high: int
+) -> Bifurcation | None:
+    """Return the branch point between two points of a symmetric branch, if it passes a family there.
+
+    ``k`` is the one between them at which a multiplier is nearest to -1.
+    """
+    three = [low, k, high]
+    sides = np.min((mu[three] + 1.0).real, axis=1)
+    away = np.min(np.abs(mu[three] + 1.0), axis=1)
+    if not (sides[0] * sides[2] > 0.0 and _may_touch(away, branch.arc[three])):
         return None
+    active = branch.model.index_of(branch.parameter)
+    before, after = branch.values[low], branch.values[high]
     family = family_near(branch[k], active, abs(float(after - before)))
     if family is None:
         return None
     value = float(family.orbit.vector[active])
     if not min(before, after) <= value <= max(before, after):
         return None
-    j = k if (branch.values[k] - value) * (after - value) <= 0.0 else k - 1
+    part = branch.values[low : high + 1] - value
+    j = low + int(np.flatnonzero(part[:-1] * part[1:] <= 0.0)[0])
     share = (value - branch.values[j]) / (branch.values[j + 1] - branch.values[j])
     position = float(branch.arc[j] + share * (branch.arc[j + 1] - branch.arc[j]))
     there = refine(replace(branch.between(position), vector=family.orbit.vector), damped=False)
     if not there.converged:
         return None
-    low, high = (k - 1, k + 1) if before < after else (k + 1, k - 1)
-    below, above = (bool(np.all(np.abs(mu[i]) < 1.0)) for i in (low, high))
+    ordered = (low, high) if before < after else (high, low)
+    below, above = (bool(np.all(np.abs(mu[i]) < 1.0)) for i in ordered)
     return Bifurcation(Kind.BP, there.params, there, (), position, below, above, bound=LEAST)

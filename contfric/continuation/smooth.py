@@ -211,7 +211,9 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
         places = locate_label(orbit, before, after, settings, k)
         if len(places) > 1 and places[1].arc - places[0].arc < SAME_LOCATION:
             places.pop()
-        if not places and not _vanishes(orbit, k, (before, after), active):
+        if not places and not (
+            _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
+        ):
             found.append(not_located(orbit, Kind.T, before, after, settings))
         for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
@@ -227,6 +229,23 @@ def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) ->
     near = [(i + step) % n for step in (-1, 0, 1)]
     motions = (point.orbit(orbit.system, orbit.vector, active) for point in points)
     return any(np.any((m.ends - m.cycle)[near, 0] < _NO_LENGTH) for m in motions)
+
+
+def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
+    """Tell whether a joint of the segment of a label lies on a surface that it does not end on.
+
+    At an event it does, and where that is known to the root of rounding what the segment crosses is, too.
+    """
+    i, c, came, goes = (int(number) for number in orbit.system.layout.labels[k][:4])
+    model, here = orbit.model, point.orbit(orbit.system, orbit.vector, active)
+    observable = model.observables[c].name
+    for joint, own in ((here.begins[i], came), (here.ends[i], goes)):
+        value = here.flow.observe(observable, float(joint[0]), joint[1:])
+        for j, surface in enumerate(model.surfaces):
+            gap = abs(value - here.flow.level(surface.name))
+            if surface.observable == observable and j != own and gap < _NO_LENGTH:
+                return True
+    return False
 
 
 def _once(found: list[Located]) -> list[Located]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
+from contfric.continuation.corners import ends_at_corner
 from contfric.continuation.ending import endless, grows, never_leaves, slows_down
 from contfric.continuation.events import TERMINAL, End, EndReason
 from contfric.continuation.limits import is_at_limit, limit_end
@@ -194,6 +195,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kept = side.count - count
         stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, kept, side.last)
         return stopped or overshoot is Overshoot.ENDED, step
+    if ends_at_corner(orbit, side, settings, side.count - count):
+        return True, step
     unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
     last, fresh = side.last - int(unresolved), side.count - count
     if settings.stop_at and stop_among(orbit, side, settings, fresh, last):
