@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,7 @@ def chunk(
                 one_scene(tally, draw(seed, index), max_periods=most_periods)
         except TimeoutError:
             tally.met("cut: longer than the limit of a scene")
+            tally.met(f"cut of {Path(draw(seed, index).model).stem}")
         except (
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
@@ -135,6 +137,8 @@ def one_scene(
         tally.met("cut: more branches than asked for")
         return
     tally.met("scenes")
+    if found.model != "coulomb":
+        tally.met(f"scenes of {Path(found.model).stem}")
     tally.met("branches", len(diagram.branches))
     tally.met("events", len(diagram.events))
     tally.met("loose ends", len(diagram.loose_ends))
