@@ -21,7 +21,8 @@ from contfric.curves.problem import border_of, problem_of
 from contfric.curves.ranges import box_of
 from contfric.orbit.solve import refine
 
-#: Starts, and processor time that they may take together (s), compiled before: each is a few thousand evaluations at worst.
+#: Starts, and processor time that they may take together after compilation (s): each is a few thousand
+#: evaluations at worst.
 STARTS, MOST = 60, 20.0
 
 
