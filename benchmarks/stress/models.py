@@ -2,9 +2,10 @@
 
 ``python benchmarks/stress/models.py --count 300 --seed 1 --workers 2 --out models.json``
 
-Each case is one of the bundled studies that explore, or a model of ``tests/models``. Its parameters are moved
-by up to a fifth, and a part of the range is explored. What is compared, excused and cut is as in
-:mod:`restarts`, whose scenes have five parameters of one model.
+Each case is one of the bundled studies that explore, a model of ``tests/models``, or one of ``typed``: models
+as users write them, with nothing said but their equations. Its parameters are moved by up to a fifth, and a
+part of the range is explored. What is compared, excused and cut is as in :mod:`restarts`, whose scenes have
+five parameters of one model. The scenes of each model are counted.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from contfric.study.library import study_names, study_path
 
 WHAT = "Diagrams of models other than coulomb, explored again from up to six of their branches."
 MODELS = Path(__file__).resolve().parents[2] / "tests" / "models"
+TYPED = Path(__file__).resolve().parent / "typed"
 #: How far parameters are moved (relative), and the part of a study's range that is explored.
 MOVED, PART = 0.2, (0.3, 1.0)
 #: What a parameter that is zero is moved by, in such moves.
@@ -36,11 +38,12 @@ DRAWS, PERIODS = 20, 2
 
 
 @cache
-def bases(folder: Path = MODELS) -> tuple[Scene, ...]:
+def bases(folders: tuple[Path, ...] = (MODELS,)) -> tuple[Scene, ...]:
     """Return the scenes about which others are drawn: studies, and models without a range of their own."""
     studies = [_of_study(yaml.safe_load(study_path(name).read_text())) for name in study_names()]
     files = [
         Scene(dict(cf.load_model(path).defaults), "", (0.0, 0.0), str(path))
+        for folder in folders
         for path in sorted(folder.glob("*.yaml"))
     ]
     return (*(scene for scene in studies if scene is not None), *files)
@@ -57,10 +60,10 @@ def _of_study(study: dict[str, Any]) -> Scene | None:
     return Scene(params, asked["parameter"], (low, high), study["model"], start)
 
 
-def scene(seed: int, index: int, folder: Path = MODELS) -> Scene:
+def scene(seed: int, index: int, folders: tuple[Path, ...] = (MODELS,)) -> Scene:
     """Return a random scene about one of the bases."""
     rng = generator(seed, index)
-    base = bases(folder)[int(rng.integers(len(bases(folder))))]
+    base = bases(folders)[int(rng.integers(len(bases(folders))))]
     model = cf.load_model(base.model)
     for _ in range(DRAWS):
         found = _moved(base, rng)
@@ -90,10 +93,11 @@ def _moved(base: Scene, rng: np.random.Generator) -> Scene:
     return replace(base, params=params, vary=vary, range=(first, first + width))
 
 
+DRAWN = partial(scene, folders=(MODELS, TYPED))
 RUN = Chunked(
     "models",
     WHAT,
-    partial(chunk, draw=scene, limit=LIMIT, most_periods=PERIODS),
+    partial(chunk, draw=DRAWN, limit=LIMIT, most_periods=PERIODS),
     CHUNK,
     limit=LIMIT,
 )

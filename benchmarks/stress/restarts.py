@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,7 @@ def chunk(
             tally.set_aside(
                 f"cut: longer than {limit:g} s of the processor", f"{draw(seed, index)}"
             )
+            tally.met(f"cut of {Path(draw(seed, index).model).stem}")
         except (
             Exception
         ) as error:  # whatever it is, it is a failure of this scene and not of the run
@@ -137,6 +139,8 @@ def one_scene(
         tally.set_aside("cut: more branches than asked for", f"{found}")
         return
     tally.met("scenes")
+    if found.model != "coulomb":
+        tally.met(f"scenes of {Path(found.model).stem}")
     tally.met("branches", len(diagram.branches))
     tally.met("events", len(diagram.events))
     tally.met("loose ends", len(diagram.loose_ends))

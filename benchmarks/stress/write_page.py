@@ -87,9 +87,10 @@ EXPLANATIONS = {
         "counted with a sign, that must be the same on both sides of an event."
     ),
     "models": (
-        "The same for other models: those that the bundled studies explore, and those of the tests. "
-        "Parameters are moved by up to a fifth, and a random part of the range is explored, in at most a "
-        "minute. Where a study has no attractor at the moved parameters there is *no start*."
+        "The same for other models: those that the bundled studies explore, those of the tests, and "
+        "models as users write them (`benchmarks/stress/typed`). Parameters are moved by up to a fifth, and "
+        "a random part of the range is explored, in at most a minute. Where a study has no attractor at the "
+        "moved parameters there is *no start*."
     ),
 }
 #: Order of the sections; others follow by name.

@@ -191,10 +191,15 @@ def _starts(branch: Branch) -> Iterator[Orbit]:
     Where its period grows without bound most of its points are at one value of the parameter, and cannot
     be told from each other: then the first of them is in the middle of the values.
     """
-    if any(end.reason is EndReason.PERIOD for end in branch.ends):
+    if _grows(branch):
         middle = 0.5 * (branch.values.min() + branch.values.max())
         yield branch[int(np.argmin(np.abs(branch.values - middle)))]
     yield from (_inside(branch, share) for share in _SHARES)
+
+
+def _grows(branch: Branch) -> bool:
+    """Tell whether the period of a branch grows without bound at one of its ends."""
+    return any(end.reason is EndReason.PERIOD for end in branch.ends)
 
 
 def _inside(branch: Branch, share: float) -> Orbit:
@@ -272,7 +277,9 @@ def _covers(known: Branch, branch: Branch) -> bool:
     length = float(branch.arc[-1])
     places = (int(np.searchsorted(branch.arc, share * length)) for share in _INSIDE)
     along = (branch[k] for k in places if 0 < k < len(branch) - 1)
-    inside = chain(along, (_inside(branch, share) for share in _INSIDE), _starts(branch))
+    ways = along, (_inside(branch, share) for share in _INSIDE), _starts(branch)
+    # most points of a period that grows without bound are at one value, where each would be compared with all
+    inside = chain(*(ways[::-1] if _grows(branch) else ways))
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)
 
 

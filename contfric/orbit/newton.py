@@ -67,6 +67,9 @@ _CIRCLES = 2
 #: What rounding in every equation may move an orbit by (relative): far above what it does near folds and
 #: vertices that are located (1e-7), far below what it does on a continuum (1e-2 and more).
 _UNDETERMINED = 1e-5
+#: Turns that a segment of an iterate may last, either way. In a solution none lasts longer than one, and what
+#: a segment costs grows with its duration: an iterate that is lost would be computed for minutes.
+_LOST = 100.0
 
 
 @helper
@@ -156,6 +159,21 @@ def off_normal(way, z):  # type: ignore[no-untyped-def]
 
 
 @helper
+def longest_of(layout, z, last):  # type: ignore[no-untyped-def]
+    """Return the longest duration of a segment, either way, and that of the turn.
+
+    Without an excitation the turn is an unknown as well: then it is the sum of all, either way.
+    """
+    longest = total = 0.0
+    for i in range(z.shape[0]):
+        end = z[i + 1, 0] if i + 1 < z.shape[0] else last[0]
+        here = abs(end - z[i, 0])
+        total += here
+        longest = here if not here <= longest else longest
+    return longest, total if layout.turn == 0.0 else abs(last[0] - z[0, 0])
+
+
+@helper
 def no_condition(way, z):  # type: ignore[no-untyped-def]
     """Border an orbit at fixed parameters: with nothing. Return (residual, segment of a tangential exit)."""
     return 0.0, -1
@@ -203,16 +221,22 @@ def correcting(border: Any) -> Any:
         work, rounding = workspace.elimination, rounding_of(layout, z)
         share, worst_before, residual_before = 1.0, np.inf, np.inf
         damped, circles = math.isfinite(trust), 0
+        turn = np.inf
         for step in range(_MOST_STEPS):
+            close_chain(functions, layout, z, p, which, workspace.equations)
+            longest, turn_here = longest_of(layout, z, workspace.equations.last)
+            turn = turn_here if step == 0 else turn
+            lost = longest > _LOST * turn
             if damped:
-                worst = mismatch(functions, layout, z, p, workspace.equations)
+                worst = np.inf if lost else mismatch(functions, layout, z, p, workspace.equations)
                 if worst > 2.0 * worst_before and share > 1e-3:
                     # the last correction went too far: take back half of it
                     share *= 0.5
                     move(z, p, which, work.z, work.w, -share)
                     continue
                 worst_before = worst
-            close_chain(functions, layout, z, p, which, workspace.equations)
+            if lost:
+                return NOT_CONVERGED, step, first, worst
             residual, tangential = border(way, z)
             if not math.isfinite(residual):
                 return NOT_FINITE, step, first, residual

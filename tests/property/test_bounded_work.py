@@ -21,7 +21,8 @@ from contfric.curves.problem import border_of, problem_of
 from contfric.curves.ranges import box_of
 from contfric.orbit.solve import refine
 
-#: Starts, and time that they may take together (s): each is a few thousand evaluations at worst.
+#: Starts, and processor time that they may take together after compilation (s): each is a few thousand
+#: evaluations at worst.
 STARTS, MOST = 60, 20.0
 
 
@@ -39,7 +40,7 @@ def wild(draw: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def test_curves(diagram: cf.Diagram) -> None:
-    draw, began, tried = np.random.default_rng(5), time.monotonic(), 0
+    draw, began, tried = np.random.default_rng(5), np.inf, 0
     box = box_of(diagram.model, ("Omega", "S"), {"Omega": (0.1, 0.7), "S": (0.0, 0.4)})
     for event in diagram.bifurcations:
         if not event.located or event.orbit.system.holds or event.kind.value == "NS":
@@ -53,13 +54,14 @@ def test_curves(diagram: cf.Diagram) -> None:
             w = orbit.vector[problem.which] + share * wild(draw, (2,))
             tangent, slope = wild(draw, joints.shape), wild(draw, (2,))
             solve_point(problem, joints, w, tangent, slope, border.copy())
+            began = min(began, time.process_time())
             tried += 1
     assert tried >= STARTS // 4
-    assert time.monotonic() - began < MOST
+    assert time.process_time() - began < MOST
 
 
 def test_branches_and_orbits(diagram: cf.Diagram) -> None:
-    draw, began = np.random.default_rng(6), time.monotonic()
+    draw, began = np.random.default_rng(6), np.inf
     for branch in diagram.branches[:4]:
         orbit = branch[len(branch) // 2]
         settings = settings_of(orbit, "Omega", (0.1, 0.9), None, True, 100)
@@ -71,4 +73,23 @@ def test_branches_and_orbits(diagram: cf.Diagram) -> None:
             first_point(moved, settings, wild(draw, joints.shape), float(wild(draw, (1,))[0]))
             refine(moved)
             moved.margins.sum()
-    assert time.monotonic() - began < MOST
+            began = min(began, time.process_time())
+    assert time.process_time() - began < MOST
+
+
+@pytest.mark.parametrize("model", ["coulomb", "jenkins", "popp"])
+def test_a_segment_of_many_turns_is_given_up(model: str) -> None:
+    """Each of its evaluations would cost as many turns, and Newton's method does not come back from there."""
+    draw, orbit = np.random.default_rng(7), cf.find_orbit(model)
+    turn = orbit.period
+    for _ in range(20):
+        joints = orbit.joints.copy()
+        which = int(draw.integers(1, len(joints)))
+        joints[which, 0] += float(draw.choice([-1.0, 1.0])) * turn * 10.0 ** draw.uniform(3.0, 9.0)
+        for damped in (False, True):
+            left = refine(replace(orbit, joints=joints), damped=damped)
+            assert not left.converged
+            assert np.array_equal(left.joints, joints)
+        joints = orbit.joints.copy()
+        joints[which, 0] += 1e-3 * turn * draw.standard_normal()
+        assert refine(replace(orbit, joints=joints)).converged
