@@ -119,7 +119,7 @@ def test_helpers_are_not_compiled_by_themselves(fresh_cache):
     )
     kernel(f8(f8))(twice).dispatcher  # noqa: B018 (compiles)
     for part in (square, fourth, total):
-        (result,) = part.overloads.values()
+        (result,) = part.dispatcher.overloads.values()
         assert result.library.get_pointer_to_function(result.fndesc.mangled_name) == 0
 
 
