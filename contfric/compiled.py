@@ -33,7 +33,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
@@ -43,6 +43,7 @@ from contfric.base.resources import SHIPPED_KERNELS, user_cache
 from contfric.base.sources import kernels_digest, kernels_folder
 from contfric.compiling.announced import announced, time_of
 from contfric.compiling.calls import KernelCompiler
+from contfric.compiling.helpers import Helper
 from contfric.compiling.inlined import part_options
 from contfric.compiling.kept import KernelFiles, file_name, writable
 from contfric.compiling.targets import shipped_target, target
@@ -248,7 +249,10 @@ def kernel(signature: Any, counts: bool = True) -> Callable[[Callable[..., Any]]
 
 
 #: A helper is never called from Python or C: its wrappers would take a quarter of the time to compile.
-_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **part_options()}
+_INSIDE = {
+    **{"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True},
+    **{"no_cfunc_wrapper": True, **part_options()},
+}
 
 
 def helper(function: F) -> F:
@@ -257,7 +261,7 @@ def helper(function: F) -> F:
     Without numba's counts of references, which cost two atomic operations for each array that is
     looked up in a tuple: half of the engine's time. It cannot be called from Python.
     """
-    return numba.njit(error_model="numpy", nogil=True, _nrt=False, **_INSIDE)(function)  # type: ignore[no-any-return]
+    return cast(F, Helper(function, {**_INSIDE, "_nrt": False}))
 
 
 def inlined_helper(function: F) -> F:
@@ -265,9 +269,7 @@ def inlined_helper(function: F) -> F:
 
     A call hands each array over as seven to nine numbers, which may cost more than what is done with them.
     """
-    return numba.njit(  # type: ignore[no-any-return]
-        error_model="numpy", nogil=True, _nrt=False, forceinline=True, **_INSIDE
-    )(function)
+    return cast(F, Helper(function, {**_INSIDE, "_nrt": False, "forceinline": True}))
 
 
 def allocating_helper(function: F) -> F:
@@ -275,4 +277,4 @@ def allocating_helper(function: F) -> F:
 
     (What numba counts references with is asked for: a helper that calls it would hand on that it has none.)
     """
-    return numba.njit(error_model="numpy", nogil=True, _nrt=True, **_INSIDE)(function)  # type: ignore[no-any-return]
+    return cast(F, Helper(function, {**_INSIDE, "_nrt": True}))

@@ -67,7 +67,7 @@ class HandleType(types.Type):  # type: ignore[misc]
         """Return the type of a member, None if there is none of that name."""
         member = self.members.get(name)
         if member is not None:
-            return types.int64 if isinstance(member, int) else types.Dispatcher(member)
+            return types.int64 if isinstance(member, int) else member._numba_type_
         kind = self.layout.get(name)
         if isinstance(kind, Signature):
             return Code(kind)

@@ -44,8 +44,8 @@ def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
     """Return the longest duration of each segment at some points of a branch, shape (segments,)."""
     at = list(asked)
     times = branch.joints[at, :, 0]
-    turns = branch.period[at] / (2.0 if branch.system.half else 1.0)
-    lasts: FloatArray = np.diff(times, append=times[:, :1] + turns[:, None], axis=1)
+    ends = times[:, :1] + branch.turns_at(at)[:, None]
+    lasts: FloatArray = np.diff(times, append=ends, axis=1)
     found: FloatArray = lasts.max(axis=0)
     return found
 

@@ -66,6 +66,8 @@ def console() -> NoReturn:
     take a quarter of a second.
     """
     gc.set_threshold(_MANY)
+    # what pydantic would look for in the metadata of every installed package
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     code = main()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):  # whoever read it has gone, or it is closed

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
-from contfric.cli import certify, commands, doctor, signatures, verify, view
+from contfric.cli import commands
 from contfric.errors import ContfricError, did_you_mean
 from contfric.models import DEFAULT_MODEL
 
@@ -83,16 +84,32 @@ def _parser() -> _Parser:
     _fill_run(add("run", commands.run, "compute what a study wants, and write the results"))
     _fill_explain(add("explain", commands.explain, "print the plan of a study; compute nothing"))
     _fill_info(add("info", commands.info, "print what a run folder holds"))
-    _fill_signatures(add("signatures", signatures.list_all, "list, show or check signatures"))
+    _fill_signatures(
+        add("signatures", _of("signatures", "list_all"), "list, show or check signatures")
+    )
     _fill_check(add("check", commands.check, "verify a model: derivatives, transitions, symmetry"))
     _fill_graph(add("graph", commands.graph, "print or draw the transitions of a model"))
     _fill_simulate(add("simulate", commands.simulate, "print the events of a trajectory as CSV"))
     _fill_census(add("census", commands.census, "list all periodic orbits, stable or not"))
-    _fill_view(add("view", view.view, "write the diagram of a run folder as a page to click on"))
-    _fill_certify(add("certify", certify.certify, "prove the diagram of a run folder"))
-    _fill_verify(add("verify", verify.verify, "check a certificate file, independently"))
-    _fill_doctor(add("doctor", doctor.doctor, "say what is compiled, and compile what is not"))
+    _fill_view(
+        add("view", _of("view", "view"), "write the diagram of a run folder as a page to click on")
+    )
+    _fill_certify(add("certify", _of("certify", "certify"), "prove the diagram of a run folder"))
+    _fill_verify(add("verify", _of("verify", "verify"), "check a certificate file, independently"))
+    _fill_doctor(
+        add("doctor", _of("doctor", "doctor"), "say what is compiled, and compile what is not")
+    )
     return parser
+
+
+def _of(module: str, name: str) -> commands.Command:
+    """Return a command; its module is imported when it is called."""
+
+    def command(options: argparse.Namespace) -> int:
+        code: int = getattr(import_module(f"contfric.cli.{module}"), name)(options)
+        return code
+
+    return command
 
 
 def _described(
@@ -151,17 +168,17 @@ def _fill_signatures(parser: argparse.ArgumentParser) -> None:
     listing = actions.add_parser(
         "list", help="names, periods and segments of all signatures", allow_abbrev=False
     )
-    _described(listing, signatures.list_all)
+    _described(listing, _of("signatures", "list_all"))
     listing.add_argument("--model", help="those of this model only")
     showing = actions.add_parser(
         "show", help="one signature, as a signature file", allow_abbrev=False
     )
-    _described(showing, signatures.show)
+    _described(showing, _of("signatures", "show"))
     showing.add_argument("name", metavar="NAME", help="a name, or the path of a file")
     checking = actions.add_parser(
         "check", help="read signature files and say what is wrong", allow_abbrev=False
     )
-    _described(checking, signatures.check)
+    _described(checking, _of("signatures", "check"))
     checking.add_argument("files", metavar="FILE", nargs="+", type=Path)
 
 

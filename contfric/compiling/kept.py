@@ -50,9 +50,12 @@ def writable(folder: Path) -> bool:
 def _unlinked(parts: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return the parts of compiled code without that for the linker: a kernel is called by its address only.
 
-    It is half of a file, and of the time to load it. What is left says which functions there are.
+    It is half of a file, and of the time to load it. What is left says which functions there are. The
+    environments of the functions inside, which numba keeps as well, are left out: compiled code asks for one
+    where it makes an object of Python, which only a kernel's own wrapper does. To load one imports the module
+    of its function, up to a tenth of a second for those of numba's compiler.
     """
-    (name, kind, content), entry, *rest = parts
+    (name, kind, content), entry, *rest, _inside = parts
     if kind == "object" and len(content) == 2:
         functions = (
             entry.llvm_func_name,
@@ -61,7 +64,7 @@ def _unlinked(parts: tuple[Any, ...]) -> tuple[Any, ...]:
         )
         text = "\n".join(f'define void @"{function}"() {{ ret void }}' for function in functions)
         content = content[0], binding.parse_assembly(text).as_bitcode()
-    return (name, kind, content), entry, *rest
+    return (name, kind, content), entry, *rest, ()
 
 
 class KernelFiles(_Cache):  # type: ignore[misc]

@@ -41,10 +41,11 @@ def solved_at_vertex(orbit: Orbit, active: int) -> Orbit | None:
     solved = refine(orbit, damped=False)
     if not solved.converged:  # the simpler orbits turn there, too
         return _refined_along(orbit, active)
-    if not abs(opening(solved)) < _OPENS:
+    opens = opening(solved)
+    if not abs(opens) < _OPENS:
         return None
-    refined = _refined(solved, active)
-    if _is_near(refined, solved) and abs(opening(refined)) < _LOCATED:
+    refined, least = _refined(solved, active, opens)
+    if _is_near(refined, solved) and least < _LOCATED:
         return refined
     return _refined_along(orbit, active)
 
@@ -119,48 +120,54 @@ def location_error(orbit: Orbit, active: int) -> float:
 
 def refined_opening(orbit: Orbit, active: int) -> Orbit | None:
     """Return the orbit nearby at which a disturbance opens that changes sign after a turn; or None."""
-    found = _refined(orbit, active)
-    if found.converged and abs(opening(found)) < EVEN:
+    found, least = _refined(orbit, active, opening(orbit))
+    if found.converged and least < EVEN:
         return found
     along = _refined_along(orbit, active)
     return along if along is not None and abs(opening(along)) < EVEN else None
 
 
-def _refined(orbit: Orbit, active: int) -> Orbit:
+def _refined(orbit: Orbit, active: int, opens: float) -> tuple[Orbit, float]:
     """Return the orbit whose turn has the multiplier -1 exactly, by secants in the parameter.
 
-    The best one that was met: whether it has the multiplier is for the caller to ask.
+    The best one that was met, and how far it misses: whether that is the multiplier is for the caller to say.
     """
     value = float(orbit.vector[active])
     size = 1.0 + abs(value)
-    return _by_secants(orbit, lambda shift, near: moved(near, active, value + shift), size)
+    return _by_secants(orbit, opens, lambda shift, near: moved(near, active, value + shift), size)
 
 
 def _refined_along(orbit: Orbit, active: int) -> Orbit | None:
     """Do the same along the curve of orbits, where that turns near the vertex; None if it fails."""
     line = Line.through(orbit, active)
     start = None if line is None else line.at(0.0)
-    if line is None or start is None or not abs(opening(start)) < _OPENS:
+    if line is None or start is None:
+        return None
+    opens = opening(start)
+    if not abs(opens) < _OPENS:
         return None
     lost = replace(start, status=Status.NOT_CONVERGED)
-    found = _by_secants(start, lambda shift, _: line.at(shift) or lost, 1.0)
-    return found if _is_near(found, orbit) and abs(opening(found)) < _LOCATED else None
+    found, least = _by_secants(start, opens, lambda shift, _: line.at(shift) or lost, 1.0)
+    return found if _is_near(found, orbit) and least < _LOCATED else None
 
 
-def _by_secants(orbit: Orbit, orbit_at: Callable[[float, Orbit], Orbit], size: float) -> Orbit:
-    """Return the orbit at which a disturbance opens, or the one that is nearest to it of those met.
+def _by_secants(
+    orbit: Orbit, opens: float, orbit_at: Callable[[float, Orbit], Orbit], size: float
+) -> tuple[Orbit, float]:
+    """Return the orbit at which a disturbance opens, or the nearest of those met, and how far it misses.
 
     Once what vanishes has had both signs no step leaves the bracket: the secant of two values that are
     rounding leads anywhere.
 
     Parameters
     ----------
+    opens : what vanishes at an opening, at the first orbit (:func:`opening`)
     orbit_at : the orbit at a shift from the first one, from another one nearby
     size : scale of the shifts
     """
     before, here = 0.0, 1e-7 * size  # far above rounding, far below the curve's curvature
     near = orbit_at(here, orbit)
-    open_before, open_here = opening(orbit), opening(near)
+    open_before, open_here = opens, opening(near)
     best, least = orbit, abs(open_before)
     ends = [np.nan, np.nan]  # the last places at which it was negative, and positive
     ends[int(open_before > 0.0)], ends[int(open_here > 0.0)] = before, here
@@ -180,7 +187,7 @@ def _by_secants(orbit: Orbit, orbit_at: Callable[[float, Orbit], Orbit], size: f
             best, least = near, abs(open_here)
         if abs(here - last) < 1e-15 * size:
             break
-    return best
+    return best, least
 
 
 def moved(orbit: Orbit, active: int, value: float) -> Orbit:

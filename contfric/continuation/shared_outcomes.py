@@ -10,11 +10,15 @@ Two contacts change at once: ``first``, at whose surface segment i ends, and ano
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
-from contfric.models.shared_loads import Limit
 from contfric.orbit.system import Itinerary
 from contfric.signature.edits import Edit
+
+if TYPE_CHECKING:
+    from contfric.models.shared_loads import Limit
 
 
 def limit_after(model: ComposedModel, itinerary: Itinerary, i: int, surface: str) -> Limit | None:

@@ -63,10 +63,13 @@ class Columns:
     def append(self, rows: dict[str, NDArray[Any]]) -> None:
         """Copy rows behind those that are there."""
         stop = self.count + len(rows["values"])
+        if not self.count:
+            self.arrays, self.count = {name: new.copy() for name, new in rows.items()}, stop
+            return
         for name, new in rows.items():
-            array = self.arrays.setdefault(name, np.empty((0, *new.shape[1:]), new.dtype))
+            array = self.arrays[name]
             if stop > len(array):
-                capacity = stop if not self.count else max(stop, self.count + self.count // _GROWTH)
+                capacity = max(stop, self.count + self.count // _GROWTH)
                 array.resize((capacity, *new.shape[1:]), refcheck=False)
             array[self.count : stop] = new
         self.count = stop

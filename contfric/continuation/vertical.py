@@ -215,8 +215,11 @@ def _is_flat(trials: list[tuple[float, float]], scale: float) -> bool:
 
 def _bordered(by_joints: FloatArray, border: Border) -> FloatArray:
     """Return the matrix [[F_z, w], [v, 0]]."""
-    w, v = border
-    return np.block([[by_joints, w[:, None]], [v[None, :], np.zeros((1, 1))]])
+    size = len(by_joints)
+    full = np.empty((size + 1, size + 1))
+    full[:size, :size], full[size, size] = by_joints, 0.0
+    full[:size, size], full[size, :size] = border
+    return full
 
 
 def _null_vectors(by_joints: FloatArray, border: Border) -> Border:

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from contfric.models.composition import Composition, composition_of
 from contfric.models.definition import Model
 from contfric.models.made import Made
 from contfric.models.parts import Domain, FloatArray, Mode, Observable, Surface
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.models.composition import Composition
     from contfric.models.growing import GrowingFlow
 
 #: A domain and a surface through which it is left.
@@ -34,6 +34,8 @@ class ComposedModel(Model):
     @cached_property
     def composition(self) -> Composition:
         """What modes are made from."""
+        from contfric.models.composition import composition_of  # other models need none of it
+
         return composition_of(self.definition)
 
     @property

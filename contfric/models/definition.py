@@ -226,7 +226,7 @@ class Model(Shown, TransitionMaps):
         """Return the period of the excitation at values of one parameter."""
         moved, active, period = vector.copy(), self.index_of(name), self.flow.period
         which, grad, found = np.empty(0, dtype=np.int64), np.empty(0), np.empty(len(values))
-        for k, value in enumerate(values):
+        for k, value in enumerate(values.tolist()):
             moved[active] = value
             found[k] = period(moved, which, grad)
         return found

@@ -7,11 +7,13 @@ import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from contfric.models.description import Description
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
 from contfric.models.python_code import Function, function_of
+
+if TYPE_CHECKING:
+    from contfric.models.description import Description
 
 T = TypeVar("T")
 

@@ -17,24 +17,6 @@ from contfric.models.on_disk import derived
 if TYPE_CHECKING:
     from contfric.base.yaml_lines import Address, LocatedYaml
 
-SUFFIXES = (".yaml", ".yml")
-
-
-def is_path(name: str) -> bool:
-    """Return whether a text is the path of a file, not a name: it has the suffix, or a folder."""
-    return name.endswith(SUFFIXES) or "/" in name or "\\" in name
-
-
-def relative_model(name: str, beside: Path) -> str | Path:
-    """Return a name as it is, and the path of a file as seen from another file's folder.
-
-    Examples
-    --------
-    >>> relative_model("coulomb", Path("studies/a.yaml"))
-    'coulomb'
-    """
-    return beside.parent / name if is_path(name) else name
-
 
 def read_model(path: Path) -> Model:
     """Build the model of a YAML file.

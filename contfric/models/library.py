@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contfric.base.resources import bundled_dir
 from contfric.errors import ContfricError, ModelError, ParameterError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.files import SUFFIXES, is_path, read_model
+from contfric.models.paths import SUFFIXES, is_path
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 ENTRY_POINTS = "contfric.models"
 
@@ -18,7 +20,7 @@ ENTRY_POINTS = "contfric.models"
 def names() -> list[str]:
     """Return all names: the closed form first, then bundled files, then those of packages."""
     found = ["coulomb", *bundled()]
-    for entry in sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name):
+    for entry in sorted(_entries(), key=lambda e: e.name):
         folder = _folder_of(entry)
         offered = [entry.name] if folder is None else sorted(_in_folder(folder))
         found.extend(name for name in offered if name not in found)
@@ -33,7 +35,7 @@ def bundled() -> list[str]:
 def find(model: Any) -> Model:
     """Return the model of a name, a path, a class or an instance of one."""
     if isinstance(model, Path) or (isinstance(model, str) and is_path(model)):
-        return read_model(Path(model))
+        return _read(Path(model))
     if isinstance(model, str):
         return _named(model)
     return _from_object(model, f"{model!r}")
@@ -46,19 +48,32 @@ def _named(name: str) -> Model:
         return coulomb
     bundled = _in_folder(bundled_dir("models")).get(name)
     if bundled is not None:
-        return read_model(bundled)
-    entries = list(entry_points(group=ENTRY_POINTS))
+        return _read(bundled)
+    entries = _entries()
     for entry in entries:
         if entry.name == name and _folder_of(entry) is None:
             return _from_object(_loaded(entry), f"entry point '{name}'")
     for entry in entries:
         folder = _folder_of(entry)
         if folder is not None and name in (files := _in_folder(folder)):
-            return read_model(files[name])
+            return _read(files[name])
     raise ParameterError(
         f"unknown model '{name}'{did_you_mean(str(name), names())}. "
         f"A file needs its suffix: {name}.yaml"
     )
+
+
+def _entries() -> list[EntryPoint]:
+    from importlib.metadata import entry_points
+
+    return list(entry_points(group=ENTRY_POINTS))
+
+
+def _read(path: Path) -> Model:
+    """Build the model of a file; the closed form needs nothing of what reads one."""
+    from contfric.models.files import read_model
+
+    return read_model(path)
 
 
 def _in_folder(folder: Path) -> dict[str, Path]:
@@ -101,7 +116,7 @@ def _from_object(found: Any, what: str) -> Model:
     if isinstance(found, Model):
         return found
     if isinstance(found, (str, Path)):
-        return read_model(Path(found))
+        return _read(Path(found))
     if isinstance(found, type) and issubclass(found, OscillatorModel):
         return model_of_class(found())
     if isinstance(found, OscillatorModel):

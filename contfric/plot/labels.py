@@ -13,6 +13,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
+from contfric.plot.measured import ticks_measured_once
 from contfric.plot.style import GREY, SMALL, sized
 
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.
@@ -86,7 +87,8 @@ def lay_out(ax: Axes) -> None:
     root = _root(ax)
     engine = root.get_layout_engine() if root is not None else None
     if root is not None and engine is not None:
-        engine.execute(root)
+        with ticks_measured_once(root):
+            engine.execute(root)
 
 
 def laid_out(figure: Figure) -> bool:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from functools import lru_cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.composed import ComposedModel
-from contfric.models.contact_laws import ContactLaws
 from contfric.models.definition import FloatArray, Model
 from contfric.models.grammar import PI, TIME, Scope, names_in, parse
 from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contact
@@ -20,6 +19,9 @@ from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function
 from contfric.quantities.tape import Tape, tape_of
+
+if TYPE_CHECKING:
+    from contfric.models.contact_laws import ContactLaws
 
 
 class Inside:

@@ -7,7 +7,6 @@ entry is the path of the folder, or a function that returns it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.metadata import entry_points
 from pathlib import Path
 
 from contfric.base.resources import bundled_dir
@@ -96,6 +95,8 @@ def _files() -> Iterator[Path]:
 
 
 def _folders() -> Iterator[Path]:
+    from importlib.metadata import entry_points  # takes long to load, and a run seldom asks
+
     yield bundled_dir("signatures")
     for entry in entry_points(group=ENTRY_POINTS):
         loaded = entry.load()

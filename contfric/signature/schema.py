@@ -12,7 +12,7 @@ from contfric.base.yaml_lines import LocatedYaml, read_yaml
 from contfric.base.yaml_schema import Part, Truth, validated
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
-from contfric.models.files import is_path, relative_model
+from contfric.models.paths import is_path, relative_model
 from contfric.signature.library import SUFFIXES, signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
 

@@ -11,7 +11,7 @@ from contfric.base.yaml_schema import validated
 from contfric.errors import NotationError, ParameterError, ResultFileError, StudyError, did_you_mean
 from contfric.models import load_model
 from contfric.models.definition import Model
-from contfric.models.files import relative_model
+from contfric.models.paths import relative_model
 from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.registry import number_quantity, quantity_names

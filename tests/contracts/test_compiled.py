@@ -63,6 +63,15 @@ def test_a_kernel_contains_its_helpers(fresh_cache):
     assert sum(second.dispatcher.stats.cache_hits.values()) == 1
 
 
+def test_a_loaded_kernel_imports_no_module_of_the_functions_inside(fresh_cache):
+    """Numba keeps an environment for each of them, and with it the name of a module."""
+    assert kernel(f8(f8))(twice)(1.5) == kernel(f8(f8))(twice)(1.5)
+    loaded = kernel(f8(f8))(twice).dispatcher
+    assert sum(loaded.stats.cache_hits.values()) == 1
+    (result,) = loaded.overloads.values()
+    assert result.referenced_envs == ()
+
+
 def test_a_loaded_kernel_cannot_be_linked_into_other_code(fresh_cache):
     """It has no code for that: linked, it would do nothing."""
     assert kernel(f8(f8))(twice)(1.5) == kernel(f8(f8))(twice)(1.5)
@@ -119,7 +128,7 @@ def test_helpers_are_not_compiled_by_themselves(fresh_cache):
     )
     kernel(f8(f8))(twice).dispatcher  # noqa: B018 (compiles)
     for part in (square, fourth, total):
-        (result,) = part.overloads.values()
+        (result,) = part.dispatcher.overloads.values()
         assert result.library.get_pointer_to_function(result.fndesc.mangled_name) == 0
 
 

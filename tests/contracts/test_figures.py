@@ -18,6 +18,7 @@ mpl.use("Agg")
 
 from matplotlib import pyplot, rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -41,7 +42,8 @@ from contfric.plot import (
     save_figure,
 )
 from contfric.plot.events import marks_of
-from contfric.plot.labels import Anchor, place_labels
+from contfric.plot.labels import Anchor, lay_out, place_labels
+from contfric.plot.measured import _MEASURE, _UPDATE
 from contfric.plot.names import event_label, parameter_label, surface_label
 from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
@@ -678,3 +680,47 @@ def test_a_study_has_one_title(diagram: Any) -> None:
     fig = Figure(figsize=(8, 6), layout="constrained")
     (other,) = plot_diagram(diagram, ("x_max",), fig, None, "At S = 0.32")
     assert other.get_title() == "At $S$ = 0.32\n$S_{0}$ = 0.4"
+
+
+def random_axes(seed: int) -> list[Axes]:
+    """Return axes in a layout, with limits of any size, that share limits or align labels or do neither."""
+    rng = np.random.default_rng(seed)
+    fig = new_figure(float(rng.uniform(3.0, 9.0)), float(rng.uniform(2.0, 8.0)))
+    rows, columns = rng.integers(1, 4, size=2)
+    axes = fig.subplots(rows, columns, squeeze=False, sharex=bool(rng.integers(2))).ravel()
+    for ax in axes:
+        low, width = rng.normal(size=2) * 10.0 ** rng.integers(-4, 5, size=2)
+        ax.set(xlim=(low, low + abs(width)), ylim=(0.0, 10.0 ** rng.integers(-4, 7)))
+        ax.set(xlabel=r"$\Omega$", ylabel="displacement")
+        if rng.integers(2):
+            ax.set_aspect(float(np.ptp(ax.get_xlim()) / np.ptp(ax.get_ylim())))
+    if rng.integers(2):
+        fig.align_ylabels(axes)
+    return list(axes)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_ticks_that_are_measured_once_give_the_same_layout(seed: int) -> None:
+    plain, kept = random_axes(seed), random_axes(seed)
+    plain[0].figure.get_layout_engine().execute(plain[0].figure)
+    lay_out(kept[0])
+    for a, b in zip(plain, kept, strict=True):
+        assert np.array_equal(a.get_position().extents, b.get_position().extents)
+        assert all(not vars(axis).keys() & {_UPDATE, _MEASURE} for axis in (b.xaxis, b.yaxis))
+    images = []
+    for ax in (plain[0], kept[0]):
+        canvas = FigureCanvasAgg(ax.figure)
+        canvas.draw()
+        images.append(np.asarray(canvas.buffer_rgba()))
+    assert np.array_equal(*images)
+
+
+def test_an_axis_measures_its_ticks_once_where_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three rows with aligned labels, laid out twice: each axis at two or three places."""
+    axes = new_figure(7.0, 6.0).subplots(3, 1)
+    axes[0].figure.align_ylabels(axes)
+    measured: list[object] = []
+    plain = getattr(Axis, _MEASURE)
+    monkeypatch.setattr(Axis, _MEASURE, lambda a, *rest: measured.append(a) or plain(a, *rest))
+    lay_out(axes[0])
+    assert 0 < len(measured) <= 3 * 6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,6 @@ from contfric.errors import ContfricError, NotationError
 from contfric.models import load_model
 from contfric.signature import (
     Signature,
-    library,
     load_signature,
     parse_signature,
     signature_names,
@@ -86,7 +86,7 @@ def test_unknown_kind_of_resource() -> None:
 
 def offer(monkeypatch: pytest.MonkeyPatch, loaded: object) -> None:
     entry = SimpleNamespace(name="plugin", load=lambda: loaded)
-    monkeypatch.setattr(library, "entry_points", lambda group: [entry])
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [entry])
 
 
 @pytest.mark.parametrize("kind", [str, Path, lambda folder: lambda: folder])

@@ -1,0 +1,23 @@
+"""What names a model: the path of a file, or a name. Reading a file takes far more to import."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def is_path(name: str) -> bool:
+    """Return whether a text is the path of a file, not a name: it has the suffix, or a folder."""
+    return name.endswith(SUFFIXES) or "/" in name or "\\" in name
+
+
+def relative_model(name: str, beside: Path) -> str | Path:
+    """Return a name as it is, and the path of a file as seen from another file's folder.
+
+    Examples
+    --------
+    >>> relative_model("coulomb", Path("studies/a.yaml"))
+    'coulomb'
+    """
+    return beside.parent / name if is_path(name) else name
