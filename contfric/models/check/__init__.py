@@ -47,6 +47,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.hidden import check_hidden
     from contfric.models.check.kinks import check_kinks
     from contfric.models.check.names import check_constraints, check_names
+    from contfric.models.check.passages import check_passages
     from contfric.models.check.probe import Probe
     from contfric.models.check.scales import check_reached, check_scales
     from contfric.models.check.structure import (
@@ -70,6 +71,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_passages(report, probe)
     check_reached(report, probe)
     check_resets(report, probe)
     check_continuity(report, probe)
