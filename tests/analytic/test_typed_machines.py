@@ -107,7 +107,7 @@ resets:
 @pytest.mark.parametrize("w0", [0.9, 1.1])
 def test_a_charge_pump_whose_states_are_said_once(tmp_path, w0: float) -> None:
     """A mean of z' and of phi' over a period: (1 - w0) Ts = K (1/(leak C) + R) Ip on."""
-    orbit = cf.find_orbit(typed(tmp_path, CHARGE_PUMP), {"w0": w0}, state=[0.5, 0.2, 0.0])
+    orbit = cf.find_orbit(typed(tmp_path, CHARGE_PUMP), {"w0": w0}, state=[0.5, 0.2])
     on = (1.0 - w0) / (0.5 * (1.0 / 0.3 + 1.0))
     time = {
         exit_: float(end[-1]) for (_, exit_), end in zip(orbit.itinerary, orbit.ends, strict=True)
@@ -206,3 +206,17 @@ def test_surfaces_that_cross_where_no_rate_jumps(tmp_path, tau: float) -> None:
     assert solved[1] == pytest.approx(u, abs=1e-10)
     assert 2.0 * (solved[2] + solved[3]) == pytest.approx(orbit.period, abs=1e-10)
     assert 0.01 < places["q1"][0] / tau**2 < 100.0
+
+
+def test_a_state_is_given_without_its_clocks(tmp_path) -> None:
+    """Just after a tick the first clock shows 0, and another one how far it is ahead."""
+    model = typed(tmp_path, CHARGE_PUMP)
+    short, whole = (cf.simulate(model, state=s, periods=3) for s in ([0.5, 0.2], [0.5, 0.2, 0.0]))
+    assert short.itinerary == whole.itinerary
+    assert np.array_equal(short.states, whole.states)
+    two = CHARGE_PUMP.replace("phi: w0 + K*z,", "phi: w0 + K*z + 0*((t + 0.3) % Ts),")
+    assert (
+        cf.simulate(typed(tmp_path, two), state=[0.5, 0.2], periods=0.1).sample([0.0])[0, -1] == 0.3
+    )
+    with pytest.raises(cf.ParameterError, match="3 finite numbers"):
+        cf.simulate(model, state=[0.5], periods=1)
