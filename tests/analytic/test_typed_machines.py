@@ -220,3 +220,37 @@ def test_a_state_is_given_without_its_clocks(tmp_path) -> None:
     )
     with pytest.raises(cf.ParameterError, match="3 finite numbers"):
         cf.simulate(model, state=[0.5], periods=1)
+
+
+#: Three climates, each left at a threshold of insolation or of ice.
+ICE = """
+name: ice
+states: [v]
+parameters: {F: 0.3, i0: 0.0, i1: 0.2, vmax: 0.8, ti: 0.2, tg: 1.2, tG: 0.6}
+period: 1
+observables: {insolation: F*cos(2*pi*t)}
+surfaces:
+  start: {observable: insolation, level: i0}
+  deep: {observable: v, level: vmax}
+  end: {observable: insolation, level: i1}
+modes:
+  i: {in: {start: +}, field: {v: -v/ti}}
+  g: {in: {deep: -}, field: {v: (1 - v)/tg - F*cos(2*pi*t)}}
+  G: {in: {end: -}, field: {v: (1 - v)/tG - F*cos(2*pi*t)}}
+resets:
+  start: {to: g, from: [i]}
+  deep: {to: G, from: [g]}
+  end: {to: i, from: [G]}
+"""
+
+
+def test_a_touch_that_only_changes_the_mode_jumps(tmp_path) -> None:
+    """Paillard's ice ages: glaciation does not end where insolation just comes to its threshold, F = i1."""
+    orbit = cf.find_orbit(typed(tmp_path, ICE))
+    assert orbit.period == pytest.approx(2.0, rel=1e-12)
+    diagram = cf.explore(orbit, "F", (0.15, 0.35))
+    (event,) = diagram.bifurcations
+    assert event.kind is cf.Kind.GS
+    assert event.params["F"] == pytest.approx(0.2, abs=1e-10)
+    assert "the map jumps" in event.meaning
+    assert diagram.verify().passed
