@@ -190,7 +190,8 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         struck = next(
             t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
         )
-        if thrown_at(orbit, next(t for t in bifurcation.tests if t.surface == struck)):
+        met = next(t for t in bifurcation.tests if t.surface == struck)
+        if thrown_at(orbit, met) or entered_at(orbit.system, met):
             return bifurcation.meaning
         return "grazing impact: the wall is just touched"
     if any(entered_at(orbit.system, test) for test in bifurcation.tests):

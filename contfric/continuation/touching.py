@@ -141,12 +141,15 @@ def entered_at(system: System, test: Test) -> str:
     model = system.model
     if model.composed or test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return ""
+    reset = model.reset_by_surface.get(test.surface)
+    if reset is not None and reset.changes:  # one that only says the mode moves no state
+        return ""
     mode = model.whole_mode(system.itinerary[test.segment][0])
     for domain in model.domains_of(mode):
-        target = model.transitions.get((domain.name, test.surface), "")
-        entered = model.domain_by_name[target].mode if target else mode
-        if entered != mode and any(d.signs == domain.signs for d in model.domains_of(entered)):
-            return entered
+        for target in model.targets.get((domain.name, test.surface), ()):
+            entered = model.domain_by_name[target].mode
+            if entered != mode and any(d.signs == domain.signs for d in model.domains_of(entered)):
+                return entered
     return ""
 
 

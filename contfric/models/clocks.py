@@ -203,7 +203,7 @@ class _Reader(ast.NodeTransformer):
     def _clock_ahead(self, shift: ast.expr, what: str) -> str:
         """Return the name of the clock that is ahead by a share of the period, which may be a new one."""
         own = ast.unparse(self.visit(shift))
-        sizes = [self._values((ast.parse(t, mode="eval").body), 0) for t in (own, self.period)]
+        sizes = [self.value((ast.parse(t, mode="eval").body), 0) for t in (own, self.period)]
         if sizes[0] < 0.0:
             own, sizes[0] = f"{self.period} + {own}", sizes[1] + sizes[0]
         if not 0.0 < sizes[0] < sizes[1]:
@@ -214,8 +214,8 @@ class _Reader(ast.NodeTransformer):
             )
         return self.ahead.setdefault(own, f"{CLOCK}{len(self.ahead) + 2}")
 
-    def _values(self, node: ast.expr, k: int) -> float:
-        """Return the value of an expression of the parameters, moved a little."""
+    def value(self, node: ast.expr, k: int = 0) -> float:
+        """Return the value of an expression of the parameters at the defaults, or moved a little."""
         moved = {
             name: float(v) * (1.0 + _MOVED[k] * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
             for i, (name, v) in enumerate(self.parameters.items())
@@ -229,8 +229,14 @@ class _Reader(ast.NodeTransformer):
         if isinstance(node, ast.Name) and node.id == PERIOD:
             return True
         own = ast.parse(self.period, mode="eval").body
-        pairs = ([self._values(e, k) for e in (node, own)] for k in range(len(_MOVED)))
+        pairs = ([self.value(e, k) for e in (node, own)] for k in range(len(_MOVED)))
         return all(abs(a - b) <= _SAME * abs(b) for a, b in pairs)
+
+
+def value_at_defaults(text: str, data: Mapping[str, Any]) -> float:
+    """Return the value of an expression of parameters and definitions, at the defaults of a model."""
+    reader = _Reader(str(data.get("period") or 1), data)
+    return float(reader.value(reader.visit(ast.parse(text.strip(), mode="eval")).body))
 
 
 def _shift_of(time: ast.expr) -> ast.expr | None:

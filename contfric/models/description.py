@@ -8,7 +8,7 @@ description can be stored anywhere (:attr:`Description.text`) and read again wit
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -157,7 +157,7 @@ class Description:
     def _reset(self, name: str, texts: Mapping[str, str]) -> dict[str, Any]:
         found: dict[str, Any] = dict(texts)
         if name in self.leads:
-            found["to"] = {lead.mode: _lead_entry(lead) for lead in self.leads[name]}
+            found["to"] = _leads_entry(self.leads[name])
         if name in self.acts:
             found["from"] = list(self.acts[name])
         return found
@@ -190,6 +190,12 @@ class Description:
             dict(self.define),
             {o.name: o.formula for o in self.observables},
         )
+
+
+def _leads_entry(leads: Sequence[Lead]) -> Any:
+    """Return what a file says of all modes that a reset leads into: a list, where one is there twice."""
+    found = {lead.mode: _lead_entry(lead) for lead in leads}
+    return found if len(found) == len(leads) else [{x.mode: _lead_entry(x)} for x in leads]
 
 
 def _lead_entry(lead: Lead) -> dict[str, Any]:

@@ -65,15 +65,18 @@ def sliding_parts(
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
-    if crossing := _crossing(description, surfaces, pairs):
+    slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
+    slides = any(
+        sliding.somewhere for sliding in slidings
+    )  # else all pass, where surfaces cross, too
+    if slides and (crossing := _crossing(description, surfaces, pairs)):
         return crossing_parts(description, crossing, data)
-    for surface, above, below in pairs:
-        name = _name(surface, above, below, pairs)
-        if name in found["modes"]:
+    for sliding in slidings:
+        if sliding.name in found["modes"]:
             raise EntryError(
-                ("modes", name), f"'{name}' is the name of the sliding mode on '{surface}'"
+                ("modes", sliding.name),
+                f"'{sliding.name}' is the name of the sliding mode on '{sliding.surface}'",
             )
-        sliding = _Sliding(formulas, surface, above, below, name)
         if sliding.somewhere:
             _add(found, sliding)
     return found

@@ -98,13 +98,18 @@ class Landing:
         images: Sequence[tuple[Domain, float, list[float]]],
     ) -> int:
         own = surface == self.surface
-        verdicts, passed = Counter[int](), True
+        named = {lead.mode for lead in self.leads}
+        verdicts, asked, passed = Counter[int](), Counter[int](), True
         for before, t, y in images:
             behind = self._behind(before, met, t, y)
-            side = self._side(behind, surface, met, t, y)
-            verdicts[side * before.signs[surface] if own else side] += 1
+            turn = before.signs[surface] if own else 1
+            verdicts[turn * self._side(behind, surface, met, t, y)] += 1
+            wanted = [d for d in behind if d.own_mode in named and d.own_mode != before.own_mode]
+            asked[turn * self._side(wanted, surface, met, t, y)] += 1
             passed = passed and len({d.mode for d in behind}) == 1
         told = {side for side in verdicts if side}
+        if len(told) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
+            told = asked.keys() - {0}
         if len(told) == 1 and (self.leads or not verdicts[0]):
             return (
                 told.pop()
@@ -123,7 +128,8 @@ class Landing:
         raise EntryError(
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
-            "side of it, some to the other, or to none: after a reset the rates must tell the side",
+            "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
+            "mode to which it leads ('to: mode', which lies on one side of that surface)",
         )
 
     def _behind(

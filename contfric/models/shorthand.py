@@ -5,17 +5,20 @@ Each is put into the data of a model, before it is read, as if it had been typed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import product
 from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.angles import with_angles
-from contfric.models.clocks import with_clock
+from contfric.models.clocks import value_at_defaults, with_clock
 from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
 from contfric.models.entries import EntryError, Part, as_identifier, listed, mapping_in
-from contfric.models.grammar import RESERVED
+from contfric.models.grammar import PERIOD, RESERVED
+from contfric.models.reset_modes import FROM, named_parts
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -37,7 +40,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
         return read(data)  # which says what is wrong, and where
     if not data.get("surfaces") and "modes" not in data and "field" in data:
         data = {**data, **_smooth(data)}
-    data = _divided_by_resets(_with_observables(with_ties_put_in(data)))
+    data = _divided_by_resets(_with_observables(_with_period(with_ties_put_in(data))))
     walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
     plain = in_units(plain, read)
@@ -112,6 +115,21 @@ def _is_regular(data: Mapping[str, Any]) -> bool:
     return lists and all(isinstance(part, Mapping) for part in (*parts, *entries, *own))
 
 
+def _with_period(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a model in which the period stands for T in levels: a switch at ``T/2``."""
+    period, surfaces = data.get("period"), mapping_in(data, "surfaces")
+    taken = PERIOD in mapping_in(data, "parameters") or PERIOD in mapping_in(data, "define")
+    if taken or isinstance(period, bool) or not isinstance(period, (str, int, float)):
+        return data
+
+    def written(entry: Mapping[str, Any]) -> dict[str, Any]:
+        level = entry.get("level")
+        found = re.sub(rf"\b{PERIOD}\b", f"({period})", level) if isinstance(level, str) else level
+        return {**entry, **({"level": found} if found != level else {})}
+
+    return {**data, "surfaces": {name: written(entry) for name, entry in surfaces.items()}}
+
+
 def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which an expression that a surface is the zero of has a name: that of the surface."""
     surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
@@ -141,35 +159,51 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which a reset acts in modes that lie on both sides of its surface.
 
     A clock is struck as its balance passes the middle on the way up: ``from: [up]`` at ``x = 0``. Each mode
-    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above. A
-    reset at a place of an angle acts in all modes, if none has a side: rotations pass it.
+    that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above; four
+    where two resets name it. A reset at a place of an angle acts in all modes, if none has a side: rotations
+    pass it.
     """
     modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
     surfaces, angles = mapping_in(data, "surfaces"), listed(data.get("angles") or ())
-    others = (
-        *(data.get("domains") or {}).values(),
-        *({"mode": mode} for r in resets.values() for mode in listed(r.get("to"))),
-    )
+    others = (data.get("domains") or {}).values()
     named = {other.get("mode") for other in others if isinstance(other, Mapping)}
+    divides: dict[str, list[str]] = {}  # the surfaces that divide each mode
     for surface, entry in resets.items():
-        asked = entry.get("from")
+        asked = entry.get(FROM)
         sided = any(surface in mapping_in(mode, "in") for mode in modes.values())
         if asked is None and not sided and surfaces.get(surface, {}).get("observable") in angles:
             asked = [*modes]
-        if not isinstance(asked, (list, tuple)):
-            continue
-        acts: list[str] = []
-        for name in map(str, asked):
+            resets[surface] = {**entry, FROM: asked}
+        for name in () if asked is None else map(str, listed(asked)):
             sides = mapping_in(modes[name], "in") if name in modes else {surface: 0}
-            parts = {f"{name}{side}": side for side in "-+"}
-            if surface in sides or name in named or parts.keys() & modes.keys():
-                acts.append(name)
-                continue
-            whole = modes.pop(name)
-            modes |= {n: {**whole, "in": {**sides, surface: side}} for n, side in parts.items()}
-            acts += parts
-        resets[surface] = {**entry, "from": acts}
-    return {**data, "modes": modes, "resets": resets} if resets else data
+            if surface not in sides and name not in named:
+                divides.setdefault(name, []).append(surface)
+    parts: dict[str, tuple[str, ...]] = {}
+    for name, between in divides.items():
+        signs = [s for s in product("-+", repeat=len(between)) if _is_somewhere(s, between, data)]
+        own = [f"{name}{''.join(sides)}" for sides in signs]
+        if not modes.keys() & {*own}:
+            whole, parts[name] = modes.pop(name), tuple(own)
+            inside = [
+                {**mapping_in(whole, "in"), **dict(zip(between, s, strict=True))} for s in signs
+            ]
+            modes |= {n: {**whole, "in": sides} for n, sides in zip(own, inside, strict=True)}
+    if not resets:
+        return data
+    return {**data, "modes": modes, "resets": named_parts(resets, parts) if parts else resets}
+
+
+def _is_somewhere(sides: Sequence[str], surfaces: Sequence[str], data: Mapping[str, Any]) -> bool:
+    """Return whether a state can have some sides of surfaces: not below one level and above a higher one."""
+    found: dict[object, tuple[list[float], list[float]]] = {}
+    for side, name in zip(sides, surfaces, strict=True):
+        entry = mapping_in(data, "surfaces").get(name, {})
+        with suppress(
+            ModelError, ArithmeticError, SyntaxError
+        ):  # whoever reads the level says what is wrong
+            level = value_at_defaults(str(entry.get("level", 0)), data)
+            found.setdefault(entry.get("observable"), ([], []))[side == "+"].append(level)
+    return all(not (above and below) or max(above) < min(below) for below, above in found.values())
 
 
 def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:

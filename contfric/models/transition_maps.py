@@ -183,6 +183,14 @@ class TransitionMaps(SectionMaps):
             return False
         return not reset.modes or domain.own_mode in reset.modes
 
+    def ends_at(self, domain: Domain, surface: str) -> bool:
+        """Return whether motion meets a reset that acts in other modes only, where its own mode ends.
+
+        A surface with a reset maps all that it bounds: none of its joints is one where nothing happens.
+        """
+        bounded = surface in self.reset_by_surface and self._side_of[domain.own_mode, surface] != 0
+        return bounded and not self.maps_at(domain, surface)
+
     @cached_property
     def _side_of(self) -> dict[tuple[str, str], int]:
         """The side of each surface that a declared mode lies on; 0 if on both, or on it."""
@@ -285,7 +293,7 @@ class TransitionMaps(SectionMaps):
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]
-        if sign == 0 or self.maps_at(domain, surface.name):
+        if sign == 0 or self.maps_at(domain, surface.name) or self.ends_at(domain, surface.name):
             return None
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}

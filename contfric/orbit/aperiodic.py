@@ -132,6 +132,8 @@ def goes_on(trajectory: Trajectory) -> str:
         signs_at(model, time, state, vector),
     )
     for surface, side in signs.items():
+        if surface in model.settled_sides:  # at rest on a wall it is on either side
+            continue
         sides = {d.signs[surface] for d in model.domains_of(whole)}
         if side and sides == {-side}:
             return (

@@ -190,8 +190,10 @@ def _check_motion(trajectory: Trajectory) -> None:
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
             why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
+        missing = trajectory.end is SimulationEnd.IMPOSSIBLE
+        says = "; `contfric check` says where no mode follows" if missing else ""
         raise ConvergenceError(
-            f"no periodic orbit: {why}. Choose other parameters or another start",
+            f"no periodic orbit: {why}. Choose other parameters or another start{says}",
             trajectory,
         )
 

@@ -37,6 +37,10 @@ def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:
         mapped = model.maps_at(model.domain_by_name[name], surface)
         if mapped or modes[targets[0]] != modes[name]:
             bounds[modes[name]].add(surface)
+    for domain in model.domains:
+        bounds[modes[domain.name]] |= {
+            r.surface for r in model.resets if model.ends_at(domain, r.surface)
+        }
     return {
         mode: tuple(s.name for s in model.surfaces if s.name in found)
         for mode, found in bounds.items()

@@ -51,6 +51,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_names,
         check_two_folds,
     )
+    from contfric.models.check.passages import check_passages
     from contfric.models.check.probe import Probe
     from contfric.models.check.scales import check_reached, check_scales
     from contfric.models.check.structure import (
@@ -73,6 +74,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_passages(report, probe)
     check_reached(report, probe)
     check_resets(report, probe)
     check_continuity(report, probe)

@@ -1,0 +1,39 @@
+"""Modes that end at a surface with a reset that acts in other modes only."""
+
+from __future__ import annotations
+
+from contfric.models.check.probe import Probe
+from contfric.models.check.report import ModelReport, Topic
+
+#: States on each surface.
+_ON_SURFACE = 200
+#: A rate this small is one that rounding has made.
+_STILL = 1e-9
+
+
+def check_passages(report: ModelReport, probe: Probe) -> None:
+    """Warn of modes that end at a surface whose reset acts in other modes only: nothing follows there."""
+    for surface in probe.model.reset_by_surface:
+        if mode := _ending(probe, surface):
+            acts = " or ".join(probe.model.reset_by_surface[surface].modes)
+            report.warn(
+                Topic.RESETS,
+                f"motion in '{mode}' meets '{surface}', where its mode ends, and the reset there acts in "
+                f"{acts} only: solutions end there. A surface with a reset is passed unchanged in modes "
+                f"that say no side of it: leave '{surface}' out of the 'in' of '{mode}', which then ends at "
+                "another surface",
+            )
+
+
+def _ending(probe: Probe, surface: str) -> str:
+    """Return a mode of which some sampled motion comes to a surface so; nothing if there is none."""
+    model = probe.model
+    ending = [d for d in model.domains if model.ends_at(d, surface)]
+    for t, y in probe.on(surface, _ON_SURFACE) if ending else ():
+        signs = probe.signs(t, y)
+        for domain in ending:
+            beside = all(domain.signs[s] == v for s, v in signs.items() if s != surface)
+            rate = probe.rate(domain.own_mode, surface, t, y) if beside else 0.0
+            if domain.signs[surface] * rate < -_STILL:
+                return domain.own_mode
+    return ""

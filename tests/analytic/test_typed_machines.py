@@ -1,0 +1,256 @@
+"""Machines, cells and circuits as their textbooks have them, against published numbers and scipy."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import fsolve
+
+import contfric as cf
+
+
+def typed(folder, text: str) -> cf.Model:
+    """Return a model from the text of its file."""
+    path = folder / "model.yaml"
+    path.write_text(text)
+    return cf.load_model(path)
+
+
+#: The simplest walker: a heel strikes at phi = 2 theta, but not where the legs pass each other.
+WALKER = """
+name: walker
+states: [theta, phi, thetad, phid]
+parameters: {gamma: 0.009}
+autonomous: true
+define:
+  falls: sin(theta - gamma)
+  swings: falls + thetad**2*sin(phi) - cos(theta - gamma)*sin(phi)
+surfaces: {heel: {observable: phi - 2*theta}, pass: {observable: phi}}
+field: {theta: thetad, phi: phid, thetad: falls, phid: swings}
+modes:
+  early: {in: {pass: +}}
+  late: {in: {pass: -, heel: -}}
+resets:
+  heel:
+    theta: -theta
+    phi: -2*theta
+    thetad: cos(2*theta)*thetad
+    phid: cos(2*theta)*(1 - cos(2*theta))*thetad
+spread: {theta: 0.4, phi: 0.6, thetad: 0.4, phid: 0.4}
+"""
+
+
+def test_the_simplest_walker(tmp_path) -> None:
+    """Garcia, Chatterjee, Ruina, Coleman (1998): both gaits at 0.009, and where the long one doubles."""
+    model = typed(tmp_path, WALKER)
+    start = [0.2, 0.4, -0.2, -0.0158]
+    orbit = cf.find_orbit(model, state=start)
+    (strike,) = [
+        e for (_, exit_), e in zip(orbit.itinerary, orbit.ends, strict=True) if exit_ == "heel"
+    ]
+    assert -strike[1] == pytest.approx(0.200310900544287, abs=1e-11)
+    assert math.cos(2 * strike[1]) * strike[3] == pytest.approx(-0.199832473004977, abs=1e-11)
+    assert orbit.multipliers[:2] == pytest.approx(
+        [-0.1900998 + 0.5575988j, -0.1900998 - 0.5575988j], abs=1e-6
+    )
+    doubling = [
+        b for b in cf.explore(orbit, "gamma", (0.008, 0.0165)).bifurcations if b.kind is cf.Kind.PD
+    ]
+    assert doubling[0].params["gamma"] == pytest.approx(0.0151, abs=5e-5)
+
+
+@pytest.mark.parametrize("lead", ["", ", to: stance"])
+def test_a_reset_does_not_map_what_ends_at_its_surface_in_another_mode(tmp_path, lead: str) -> None:
+    """It mapped that too; now solutions end there, and check says why."""
+    modes = "{stance: {in: {heel: +}}, late: {in: {heel: -}}}"
+    text = WALKER.replace(", pass: {observable: phi}", "")
+    text = text.replace(
+        "modes:\n  early: {in: {pass: +}}\n  late: {in: {pass: -, heel: -}}", f"modes: {modes}"
+    )
+    text = text.replace(
+        "theta: -theta\n", f"theta: -theta\n    from: [late]\n{lead.replace(', ', '    ')}\n"
+    )
+    if not lead:
+        with pytest.raises(cf.ModelError, match="or the mode to which it leads"):
+            typed(tmp_path, text)
+        return
+    model = typed(tmp_path, text)
+    assert "motion in 'stance' meets 'heel'" in str(cf.check_model(model))
+    with pytest.raises(cf.ConvergenceError, match="`contfric check` says"):
+        cf.find_orbit(model, state=[0.2003109, 0.4007, -0.1998325, -0.0158])
+    late = cf.simulate(model, state=[-0.17, -0.39, -0.19, -0.02], domain="late", periods=1.5)
+    assert [event[:2] for event in late.itinerary] == [("late", "heel")]
+
+
+#: A phase detector with three states, named by two resets that divide them all.
+CHARGE_PUMP = """
+name: pump
+states: [phi, z]
+parameters: {Ip: 1.0, R: 1.0, C: 1.0, K: 0.5, w0: 0.9, Ts: 1.0, leak: 0.3}
+period: Ts
+surfaces: {vco: {observable: phi, level: 1}}
+modes:
+  idle: {field: {phi: w0 + K*z, z: -leak*z}}
+  up: {field: {phi: w0 + K*(z + R*Ip), z: Ip/C - leak*z}}
+  down: {field: {phi: w0 + K*(z - R*Ip), z: -Ip/C - leak*z}}
+resets:
+  tick: {to: {idle: {from: down}, up: {from: idle}}}
+  vco: {phi: phi - 1, from: [idle, up, down], to: {idle: {from: up}, down: {from: idle}}}
+"""
+
+
+#: Gardner's loop: it is locked where the charge that leaks away comes back while the pump is on.
+@pytest.mark.parametrize("w0", [0.9, 1.1])
+def test_a_charge_pump_whose_states_are_said_once(tmp_path, w0: float) -> None:
+    """A mean of z' and of phi' over a period: (1 - w0) Ts = K (1/(leak C) + R) Ip on."""
+    orbit = cf.find_orbit(typed(tmp_path, CHARGE_PUMP), {"w0": w0}, state=[0.5, 0.2])
+    on = (1.0 - w0) / (0.5 * (1.0 / 0.3 + 1.0))
+    time = {
+        exit_: float(end[-1]) for (_, exit_), end in zip(orbit.itinerary, orbit.ends, strict=True)
+    }
+    assert orbit.period == pytest.approx(1.0, abs=1e-13)
+    assert time["vco"] % 1.0 == pytest.approx(on % 1.0, abs=1e-12)
+    assert any(mode.startswith("up" if w0 < 1.0 else "down") for mode, _ in orbit.itinerary)
+
+
+#: A reactor between two thyristors, fired twice a period; each goes out where its current does.
+REACTOR = """
+name: reactor
+states: [v, il, ir]
+parameters: {fire: 1.9, Ls: 0.1, Rs: 0.2, C: 0.4, Lr: 0.5}
+period: 2*pi
+surfaces:
+  on1: {observable: "mod(t, T)", level: fire}
+  on2: {observable: "mod(t, T)", level: fire + T/2}
+  zero: {observable: ir}
+modes:
+  blocked: {in: {zero: 0}, field: {v: il/C, il: (sin(t) - v - Rs*il)/Ls, ir: 0}}
+  forward: {in: {zero: +}, field: {v: (il - ir)/C, il: (sin(t) - v - Rs*il)/Ls, ir: v/Lr}}
+  backward: {in: {zero: -}, field: {v: (il - ir)/C, il: (sin(t) - v - Rs*il)/Ls, ir: v/Lr}}
+resets:
+  on1: {to: forward, from: [blocked]}
+  on2: {to: backward, from: [blocked]}
+"""
+
+
+@pytest.mark.parametrize("fire", [1.9, 2.3])
+def test_thyristors_that_two_resets_fire(tmp_path, fire: float) -> None:
+    """Half a period by scipy: what conducts from the firing to the end of its current is its mirror image."""
+    orbit = cf.find_orbit(typed(tmp_path, REACTOR), {"fire": fire})
+    (start,) = [
+        e for (_, exit_), e in zip(orbit.itinerary, orbit.ends, strict=True) if exit_ == "on1"
+    ]
+
+    def conducts(t, y):
+        return (y[1] - y[2]) / 0.4, (math.sin(t) - y[0] - 0.2 * y[1]) / 0.1, y[0] / 0.5
+
+    def blocks(t, y):
+        return y[1] / 0.4, (math.sin(t) - y[0] - 0.2 * y[1]) / 0.1, 0.0
+
+    def out(t, y):
+        return y[2]
+
+    out.terminal, out.direction = True, -1
+    tight = {"rtol": 1e-11, "atol": 1e-12, "method": "DOP853"}
+    on = solve_ivp(conducts, (fire, fire + math.pi), [*start[1:3], 0.0], events=out, **tight)
+    off = solve_ivp(blocks, (on.t[-1], fire + math.pi), [*on.y[:2, -1], 0.0], **tight)
+    assert off.y[:2, -1] == pytest.approx(-start[1:3], abs=1e-9)
+
+
+#: Two relays in turn, with a lag: no rate of x or v jumps, and nothing slides where the two surfaces cross.
+TWISTING = """
+name: twisting
+states: [x, v, u]
+parameters: {r1: 2.0, r2: 1.0, tau: 0.1}
+autonomous: true
+surfaces: {sx: {observable: x, sliding: filippov}, sv: {observable: v, sliding: filippov}}
+field: {x: v, v: u, u: (-r1*sign(x) - r2*sign(v) - u)/tau}
+modes:
+  q1: {in: {sx: +, sv: +}}
+  q2: {in: {sx: -, sv: +}}
+  q3: {in: {sx: -, sv: -}}
+  q4: {in: {sx: +, sv: -}}
+symmetry: x -> -x, v -> -v, u -> -u
+spread: {x: 0.5, v: 0.5, u: 3}
+"""
+
+
+@pytest.mark.parametrize("tau", [0.05, 0.1])
+def test_surfaces_that_cross_where_no_rate_jumps(tmp_path, tau: float) -> None:
+    """Levant's twisting controller behind an actuator: amplitudes of order tau^2, by matrix exponentials."""
+    orbit = cf.find_orbit(typed(tmp_path, TWISTING), {"tau": tau})
+    assert {mode for mode, _ in orbit.itinerary} == {"q1", "q2", "q3", "q4"}
+    matrix = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / tau]])
+
+    def after(time: float, state, force: float) -> np.ndarray:
+        whole = np.zeros((4, 4))
+        whole[:3, :3], whole[2, 3] = matrix, force / tau
+        return (expm(whole * time) @ [*state, 1.0])[:3]
+
+    def half(unknown):
+        v, u, first, second = unknown
+        peak = after(first, [0.0, v, u], -3.0)
+        end = after(second, peak, -1.0)
+        return peak[1], end[0], end[1] + v, end[2] + u
+
+    places = {mode: end[1:] for (mode, _), end in zip(orbit.itinerary, orbit.ends, strict=True)}
+    times = np.diff([end[0] for end in orbit.ends])
+    _, v, u = places["q2"]
+    guess = [v, u, float(orbit.ends[0][0] + orbit.period - orbit.ends[-1][0]), float(times[0])]
+    solved = fsolve(half, guess, xtol=1e-13)
+    assert solved[0] == pytest.approx(v, abs=1e-10)
+    assert solved[1] == pytest.approx(u, abs=1e-10)
+    assert 2.0 * (solved[2] + solved[3]) == pytest.approx(orbit.period, abs=1e-10)
+    assert 0.01 < places["q1"][0] / tau**2 < 100.0
+
+
+def test_a_state_is_given_without_its_clocks(tmp_path) -> None:
+    """Just after a tick the first clock shows 0, and another one how far it is ahead."""
+    model = typed(tmp_path, CHARGE_PUMP)
+    short, whole = (cf.simulate(model, state=s, periods=3) for s in ([0.5, 0.2], [0.5, 0.2, 0.0]))
+    assert short.itinerary == whole.itinerary
+    assert np.array_equal(short.states, whole.states)
+    two = CHARGE_PUMP.replace("phi: w0 + K*z,", "phi: w0 + K*z + 0*((t + 0.3) % Ts),")
+    assert (
+        cf.simulate(typed(tmp_path, two), state=[0.5, 0.2], periods=0.1).sample([0.0])[0, -1] == 0.3
+    )
+    with pytest.raises(cf.ParameterError, match="3 finite numbers"):
+        cf.simulate(model, state=[0.5], periods=1)
+
+
+#: Three climates, each left at a threshold of insolation or of ice.
+ICE = """
+name: ice
+states: [v]
+parameters: {F: 0.3, i0: 0.0, i1: 0.2, vmax: 0.8, ti: 0.2, tg: 1.2, tG: 0.6}
+period: 1
+observables: {insolation: F*cos(2*pi*t)}
+surfaces:
+  start: {observable: insolation, level: i0}
+  deep: {observable: v, level: vmax}
+  end: {observable: insolation, level: i1}
+modes:
+  i: {in: {start: +}, field: {v: -v/ti}}
+  g: {in: {deep: -}, field: {v: (1 - v)/tg - F*cos(2*pi*t)}}
+  G: {in: {end: -}, field: {v: (1 - v)/tG - F*cos(2*pi*t)}}
+resets:
+  start: {to: g, from: [i]}
+  deep: {to: G, from: [g]}
+  end: {to: i, from: [G]}
+"""
+
+
+def test_a_touch_that_only_changes_the_mode_jumps(tmp_path) -> None:
+    """Paillard's ice ages: glaciation does not end where insolation just comes to its threshold, F = i1."""
+    orbit = cf.find_orbit(typed(tmp_path, ICE))
+    assert orbit.period == pytest.approx(2.0, rel=1e-12)
+    diagram = cf.explore(orbit, "F", (0.15, 0.35))
+    (event,) = diagram.bifurcations
+    assert event.kind is cf.Kind.GS
+    assert event.params["F"] == pytest.approx(0.2, abs=1e-10)
+    assert "the map jumps" in event.meaning
+    assert diagram.verify().passed
