@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from contfric.continuation.branch import Branch
+from contfric.continuation.report import ROUGH
 from contfric.models.definition import FloatArray
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
@@ -103,14 +104,16 @@ def _is_symmetric(branch: Branch) -> bool:
 
 
 def _undetermined(branch: Branch) -> bool:
-    """Tell whether a narrow bridge ends where rounding leaves no location of the event in the whole range.
+    """Tell whether a narrow bridge ends where rounding leaves no location of the event within its own width.
 
     Its equations are singular there. Such a bridge is one of many that a continuum of holds without damping
-    seems to consist of: each begins and ends where rounding has it. A wide one is known by its points.
+    seems to consist of: each begins and ends where rounding has it. A wide one is known by its points, and
+    an event that is known better than to the root of rounding is regular.
     """
-    narrow = np.ptp(branch.values) < _NARROW * (1.0 + np.max(np.abs(branch.values)))
+    width = float(np.ptp(branch.values))
+    narrow = width < _NARROW * (1.0 + np.max(np.abs(branch.values)))
     ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
-    return bool(branch.bridge and narrow and any(b.accuracy >= 1.0 for b in ends))
+    return bool(branch.bridge and narrow and any(b.accuracy > max(ROUGH, width) for b in ends))
 
 
 def _violates(branch: Branch) -> bool:

@@ -25,8 +25,10 @@ from contfric.orbit.orbit import Orbit
 _TURN, _STEP = 0.12, 1e-5
 #: Distance from the start of a side below which the step control has not found its step yet.
 _START = 10.0 * _STEP
-#: Share of what a margin was along the side that is left of it where it vanishes.
-_FALLEN = 1e-2
+#: Share of what a margin was along the side that is left of it where it vanishes; and the most that is left,
+#: at the tip of a hyperbola as wide as rounding makes it: one of its equations is off by units of rounding, of
+#: which some hundreds come together in a margin. Where margins stay above, steps are short for another reason.
+_FALLEN, _LEFT = 1e-2, 1e3 * float(np.finfo(float).eps)
 
 
 def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> bool:
@@ -60,4 +62,4 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
 def _has_fallen(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> bool:
     """Tell whether a margin has come to zero along a side, and is not zero all along."""
     before = side.rows.tests[: k + 1, orbit.system.tests.index(found.tests[0])]
-    return bool(before[-1] < _FALLEN * np.max(before))
+    return bool(before[-1] < min(_LEFT, _FALLEN * np.max(before)))

@@ -184,7 +184,8 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
         return first
     i = test.segment
     limit = _grazed_limit(here, point, first)
-    if limit != first or not here.model.filippov:
+    # a hold ends at a load, as rest does: nothing slides up to it
+    if limit != first or not here.model.filippov or is_hold(here.itinerary[i][1]):
         return limit
     if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
         return first
