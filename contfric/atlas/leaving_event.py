@@ -54,9 +54,13 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     if candidate.away is not None:
         branch = _leave_beside(state, orbit, candidate.away, event, settings)
         return branch or _leave_together(state, orbit, event, settings)
+    longest: tuple[Orbit, Side] | None = None
     for first_step in _NEAR_EVENT:
-        longest, stands = _longest_way(orbit, event, settings, first_step, state.progress)
-        if longest is not None or not stands:
+        found, stands = _longest_way(orbit, event, settings, first_step, state.progress)
+        if found is not None and (longest is None or found[1].length > longest[1].length):
+            longest = found
+        # where the parameter stands a short side may have left in the wrong direction, by rounding
+        if not stands or (longest is not None and longest[1].length > _SURELY_AWAY):
             break
     if longest is None:
         return leave_singular(state, orbit, event, settings)

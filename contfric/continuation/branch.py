@@ -159,22 +159,11 @@ class Branch(Shown):
         return self.turns_at(slice(None)) * (2.0 if self.system.half else 1.0)
 
     def turns_at(self, points: slice | Sequence[int]) -> FloatArray:
-        """Return the duration of one turn (half of a symmetric orbit) at some points.
-
-        Examples
-        --------
-        >>> import contfric as cf
-        >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-        >>> branch = cf.continue_orbit(orbit, "Omega", (0.5, 0.51))
-        >>> bool(branch.turns_at([0])[0] == branch[0].turn)
-        True
-        """
+        """Return the duration of one turn (half of a symmetric orbit) at some points."""
         if self.model.autonomous:
             return -self.joints[points, 0, 0]
-        values = self.values[points]
-        return self.system.layout.turn * self.model.periods_along(
-            self.vector, self.parameter, values
-        )
+        periods = self.model.periods_along(self.vector, self.parameter, self.values[points])
+        return self.system.layout.turn * periods
 
     @cached_property
     def name(self) -> str:

@@ -158,7 +158,7 @@ MISTAKES = [
         "name: spring",
         "name: spring\nresets: {v: {v: -v}}",
         2,
-        "after a reset the rates must tell the side",
+        "the rates after a reset must tell the side",
     ),
     ("name: spring", "name: spring\ndomains: {a: {mode: forward}}", 2, "it holds for: forward:u+"),
     (
