@@ -26,8 +26,8 @@ _TURN, _STEP = 0.12, 1e-5
 #: Distance from the start of a side below which the step control has not found its step yet.
 _START = 10.0 * _STEP
 #: Share of what a margin was along the side that is left of it where it vanishes; and the most that is left,
-#: at the tip of a hyperbola as wide as rounding makes it: one of its equations is off by units of rounding, of
-#: which some hundreds come together in a margin. Where margins stay above, steps are short for another reason.
+#: at the tip of a hyperbola as wide as rounding makes it: some hundreds of units of rounding come together in
+#: a margin. Where margins stay above, steps are short for another reason.
 _FALLEN, _LEFT = 1e-2, 1e3 * float(np.finfo(float).eps)
 
 
