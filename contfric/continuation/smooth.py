@@ -32,6 +32,8 @@ SAME_LOCATION = 1e-7
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 SAME_TANGENCY = 2e-6
+#: Between two points of a branch no condition is violated by more: a hundred times what a location is off by.
+_OUTSIDE = 1e-9
 #: A segment this short has no length: an event at which it comes in is located to the root of rounding.
 _NO_LENGTH = 1e-6
 #: A multiplier this large is that of an exit without a rate.
@@ -217,6 +219,8 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
             found.append(not_located(orbit, Kind.T, before, after, settings))
         for point in places:
             here = point.orbit(orbit.system, orbit.vector, active)
+            if here.margins.min(initial=0.0) < -_OUTSIDE:
+                continue  # where curves cross a trial may lie on another one
             test = Test(*_label_location(orbit, k))
             b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
             found.append((b, point))
