@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.continuation.continuum import LEVEL
 from contfric.continuation.doubling_point import opens_through
-from contfric.continuation.events import Kind
+from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.folds import (
     NEAR_ONE,
     SHORTEST_OVERSHOOT,
@@ -34,6 +34,8 @@ SAME_LOCATION = 1e-7
 SAME_TANGENCY = 2e-6
 #: Between two points of a branch no condition is violated by more: a hundred times what a location is off by.
 _OUTSIDE = 1e-9
+#: Share of a margin that is left over where it vanishes.
+_FALLEN = 1e-2
 #: A segment this short has no length: an event at which it comes in is located to the root of rounding.
 _NO_LENGTH = 1e-6
 #: A multiplier this large is that of an exit without a rate.
@@ -52,7 +54,7 @@ def smooth_events(
     from contfric.continuation.bracket import BY_TEST
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
-    base = len(before.tests) - EXTRA
+    base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     # events after a sliding one do not happen
     after = _last_told(orbit, beyond, settings) or after
     values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
@@ -78,11 +80,12 @@ def smooth_events(
             point = None
         if column == FOLD:
             folded = True
-            found += (
+            folds = (
                 fold_between(orbit, before, after, beyond, share, settings)
                 if point is None
                 else fold_at(orbit, before, after, beyond, point, settings)
             )
+            found += [fold for fold in folds if not _is_sliding(orbit, before, fold[0], active)]
         elif point is not None:
             found += _at_multiplier(orbit, column, before, beyond, point, settings)
         elif lost:  # a pole is no event: multipliers are infinite where an exit becomes tangential
@@ -92,6 +95,15 @@ def smooth_events(
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
     return [*found, *_tangencies(orbit, before, beyond, settings)]
+
+
+def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> bool:
+    """Tell whether a fold is the sliding event next to it: slopes are rounding where curves cross."""
+    left = float(fold.orbit.margins.min(initial=np.inf))
+    if fold.kind is not Kind.SN or not (fold.located and left < _OUTSIDE):
+        return False
+    here = before.orbit(orbit.system, orbit.vector, active)
+    return left < _FALLEN * float(here.margins.min(initial=np.inf))
 
 
 def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
