@@ -57,7 +57,7 @@ def compute_all(
     say : called when the executor has lost tasks
     compute : returns the rows of a task
     threads : most threads of this process; one where tasks are Python, which holds the lock
-    following : returns the task that needs the rows of one with a name; None where there is none
+    following : returns the task that needs the rows of one with a name; None at the end of its chain
 
     A task that fails there (a killed worker, a broken pool, a lost connection) is computed in this process,
     with those that follow it; only if that fails, too, is it an error.

@@ -66,9 +66,8 @@ def sliding_parts(
     }
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
     slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
-    slides = any(
-        sliding.somewhere for sliding in slidings
-    )  # else all pass, where surfaces cross, too
+    # where nothing slides all pass, where surfaces cross, too
+    slides = any(sliding.somewhere for sliding in slidings)
     if slides and (crossing := _crossing(description, surfaces, pairs)):
         return crossing_parts(description, crossing, data)
     for sliding in slidings:

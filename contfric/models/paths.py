@@ -12,7 +12,7 @@ def is_path(name: str) -> bool:
     return name.endswith(SUFFIXES) or "/" in name or "\\" in name
 
 
-def relative_model(name: str, beside: Path) -> str | Path:
+def relative_model(name: str, file: Path) -> str | Path:
     """Return a name as it is, and the path of a file as seen from another file's folder.
 
     Examples
@@ -20,4 +20,4 @@ def relative_model(name: str, beside: Path) -> str | Path:
     >>> relative_model("coulomb", Path("studies/a.yaml"))
     'coulomb'
     """
-    return beside.parent / name if is_path(name) else name
+    return file.parent / name if is_path(name) else name

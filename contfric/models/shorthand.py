@@ -198,9 +198,8 @@ def _is_somewhere(sides: Sequence[str], surfaces: Sequence[str], data: Mapping[s
     found: dict[object, tuple[list[float], list[float]]] = {}
     for side, name in zip(sides, surfaces, strict=True):
         entry = mapping_in(data, "surfaces").get(name, {})
-        with suppress(
-            ModelError, ArithmeticError, SyntaxError
-        ):  # whoever reads the level says what is wrong
+        # whoever reads the level says what is wrong
+        with suppress(ModelError, ArithmeticError, SyntaxError):
             level = value_at_defaults(str(entry.get("level", 0)), data)
             found.setdefault(entry.get("observable"), ([], []))[side == "+"].append(level)
     return all(not (above and below) or max(above) < min(below) for below, above in found.values())

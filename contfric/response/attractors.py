@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.errors import (
-    ContfricError,
+    ConvergenceError,
     ParameterError,
     items_of,
     shown,
@@ -67,7 +67,7 @@ class Attractors:
             return False
         try:
             orbit = find_orbit(self.model, self.model.mapping(self.vector), state=state, time=time)
-        except ContfricError:  # aperiodic, unbounded, at rest, or no solution at all
+        except ConvergenceError:  # aperiodic, unbounded, at rest, or no solution at all
             return False
         return self.add(orbit)
 

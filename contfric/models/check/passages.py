@@ -26,14 +26,14 @@ def check_passages(report: ModelReport, probe: Probe) -> None:
 
 
 def _ending(probe: Probe, surface: str) -> str:
-    """Return a mode of which some sampled motion comes to a surface so; nothing if there is none."""
+    """Return a mode of which some sampled motion comes to a surface so; "" if none does."""
     model = probe.model
     ending = [d for d in model.domains if model.ends_at(d, surface)]
     for t, y in probe.on(surface, _ON_SURFACE) if ending else ():
         signs = probe.signs(t, y)
         for domain in ending:
-            beside = all(domain.signs[s] == v for s, v in signs.items() if s != surface)
-            rate = probe.rate(domain.own_mode, surface, t, y) if beside else 0.0
+            inside = all(domain.signs[s] == v for s, v in signs.items() if s != surface)
+            rate = probe.rate(domain.own_mode, surface, t, y) if inside else 0.0
             if domain.signs[surface] * rate < -_STILL:
                 return domain.own_mode
     return ""
