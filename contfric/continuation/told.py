@@ -60,7 +60,9 @@ def last_told(
     """
     here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     if beyond is not after and _comes_in(here):
-        return _told_before(orbit, before, beyond, settings)
+        told = _told_before(orbit, before, beyond, settings)
+        if told is not None:
+            return told
     if not np.isfinite(beyond.tests[-EXTRA:]).all():
         return None
     if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
@@ -78,18 +80,22 @@ def _if_finite(point: Point | None) -> Point | None:
 
 
 def _told_before(orbit: Orbit, before: Point, event: Point, settings: Settings) -> Point | None:
-    """Return the point before an event from which on all belongs to it; None if it is not found."""
+    """Return the point before an event from which on all belongs to it; None where that is not told.
+
+    So it is where the parameter goes on through the event, as it does where no two curves cross.
+    """
     least, length = SAME_VALUE * settings.width, event.arc - before.arc
     if abs(event.value - before.value) <= least and length <= SAME_FOLD:
         return before
-    # w = w_e - b d + c d^2 at a distance d: b is 0 where two curves cross, and c d^2 reaches what is least
+    # where two curves cross the parameter leaves the event with the square of the distance
     bend = abs(event.value - before.value - before.slope * length) / length**2
-    back = min(SAME_FOLD, 0.5 * length, np.sqrt(least / bend) if bend > 0.0 else np.inf)
+    back = min(SAME_FOLD, 0.5 * length, float(np.sqrt(least / bend)) if bend > 0.0 else np.inf)
     while back > SAME_LOCATION:
         point = _point_at(orbit, before, event, _WITHIN * back, settings)
-        if point is not None and abs(event.value - point.value) <= least:
+        left = np.inf if point is None else abs(event.value - point.value)
+        if left <= least:
             return point
-        back *= 0.5
+        back *= 0.5 if point is None else min(0.5, least / left)
     return None
 
 

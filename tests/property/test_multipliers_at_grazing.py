@@ -134,6 +134,54 @@ def test_no_event_of_multipliers_is_told_where_a_spring_is_only_touched(
     assert all(abs(b.params["d"] / amplitude - 1.0) > 1e-5 for b in others)
 
 
+def random_row_that_rubs(seed: int, size: int) -> cf.Model:
+    """Return masses in a row with friction and a Jenkins element, under a force with two harmonics."""
+    draw = np.random.default_rng([seed, size, 3])
+    stiffness = np.diag(draw.uniform(0.5, 2.0, size))
+    for i in range(size - 1):
+        spring = draw.uniform(0.3, 1.5)
+        stiffness[i : i + 2, i : i + 2] += spring * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    damping = draw.uniform(0.02, 0.1) * stiffness
+    rubs = {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S"}
+    contacts = {"a": rubs}
+    if size > 2:
+        contacts["b"] = rubs | {"velocity": "v3", "kinetic": "0.7*S", "static": "0.7*S"}
+    contacts["j"] = {"kind": "jenkins", "displacement": "q2", "stiffness": "0.8", "limit": "0.3"}
+    second = float(draw.uniform(0.0, 0.5))
+    w, friction = float(draw.uniform(0.4, 0.9)), float(draw.uniform(0.1, 0.5))
+    return cf.Mechanism(
+        np.eye(size),
+        damping,
+        stiffness,
+        contacts=contacts,
+        force={f"q{size}": f"F*cos(W*t) + {second!r}*cos(2*W*t + 0.4)"},
+        parameters={"W": w, "F": 1.0, "S": friction},
+        period="2*pi/W",
+        name=f"row-{seed}-{size}",
+    )
+
+
+@pytest.mark.parametrize(
+    ("size", "seed"),  # with (2, 3) nothing happens within the range
+    [
+        *((2, seed) for seed in (2, 4)),
+        (3, 8),
+        *(pytest.param(2, seed, marks=pytest.mark.slow) for seed in (0, 1, 5, 6, 7)),
+        *(pytest.param(3, seed, marks=pytest.mark.slow) for seed in range(6)),
+    ],
+)
+def test_a_fold_has_a_multiplier_of_one_next_to_a_slide_that_grazes(size: int, seed: int) -> None:
+    model = random_row_that_rubs(seed, size)
+    found = cf.explore(
+        cf.find_orbit(model, {}), "F", (0.8, 1.3), max_periods=1, bridges=False, max_branches=20
+    )
+    assert any(b.tests for b in found.bifurcations)
+    for event in found.bifurcations:
+        assert event.located
+        if event.kind in (cf.Kind.SN, cf.Kind.BP):
+            assert np.abs(event.orbit.multipliers - 1.0).min() < 1e-3
+
+
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 3))]
 )
