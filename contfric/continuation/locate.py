@@ -5,11 +5,9 @@ from __future__ import annotations
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.sliding import sliding_events
-from contfric.continuation.smooth import SAME_LOCATION, SAME_TANGENCY, smooth_events
+from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
+from contfric.continuation.told import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.orbit.orbit import Orbit
-
-#: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
-_SAME_VALUE, _SAME_FOLD = 1e-9, 1e-4
 
 
 def locate_events(
@@ -48,4 +46,4 @@ def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings)
         return True
     if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
         return False
-    return abs(point.value - end.value) < _SAME_VALUE * settings.width and apart < _SAME_FOLD
+    return abs(point.value - end.value) < SAME_VALUE * settings.width and apart < SAME_FOLD

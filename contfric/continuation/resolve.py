@@ -18,8 +18,8 @@ from contfric.continuation.section_joints import (
 )
 from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
-from contfric.continuation.smooth import SAME_LOCATION
 from contfric.continuation.stopping import stop_between
+from contfric.continuation.told import SAME_LOCATION
 from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.orbit.orbit import Orbit
 

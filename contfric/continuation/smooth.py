@@ -21,14 +21,12 @@ from contfric.continuation.folds import (
 from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
-from contfric.continuation.side import first_point, point_before
+from contfric.continuation.side import first_point
+from contfric.continuation.told import NO_LENGTH, SAME_LOCATION, last_told
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test
 
-#: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
-#: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
-SAME_LOCATION = 1e-7
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
 SAME_TANGENCY = 2e-6
@@ -36,10 +34,6 @@ SAME_TANGENCY = 2e-6
 _OUTSIDE = 1e-9
 #: Share of a margin that is left over where it vanishes.
 _FALLEN = 1e-2
-#: A segment this short has no length: an event at which it comes in is located to the root of rounding.
-_NO_LENGTH = 1e-6
-#: A multiplier this large is that of an exit without a rate.
-_INFINITE = 1e8
 #: A function of the multipliers that changes by more than the second share of its change over a step, over
 #: the first share of the step, is rounding; the longest step over which that is asked.
 _NUDGE, _ERRATIC, _SHORT = 1e-3, 0.1, 1e-3
@@ -56,7 +50,7 @@ def smooth_events(
 
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     # events after a sliding one do not happen
-    after = _last_told(orbit, beyond, settings) or after
+    after = last_told(orbit, before, after, beyond, settings) or after
     values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
     found: list[Located] = []
     folded = False
@@ -104,21 +98,6 @@ def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> 
         return False
     here = before.orbit(orbit.system, orbit.vector, active)
     return left < _FALLEN * float(here.margins.min(initial=np.inf))
-
-
-def _last_told(orbit: Orbit, beyond: Point, settings: Settings) -> Point | None:
-    """Return the last point at which the signs of multipliers are told, or None.
-
-    Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event
-    it is infinite, or its sign is that of a rate that is rounding.
-    """
-    if not np.isfinite(beyond.tests[-EXTRA:]).all():
-        return None
-    if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
-        return beyond
-    here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-    told = point_before(here, beyond, SAME_LOCATION, settings)
-    return told if told is not None and np.isfinite(told.tests[-EXTRA:]).all() else None
 
 
 def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings: Settings) -> bool:
@@ -244,7 +223,7 @@ def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) ->
     i, n = int(orbit.system.layout.labels[k][0]), orbit.system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
     motions = (point.orbit(orbit.system, orbit.vector, active) for point in points)
-    return any(np.any((m.ends - m.cycle)[near, 0] < _NO_LENGTH) for m in motions)
+    return any(np.any((m.ends - m.cycle)[near, 0] < NO_LENGTH) for m in motions)
 
 
 def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
@@ -259,7 +238,7 @@ def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
         value = here.flow.observe(observable, float(joint[0]), joint[1:])
         for j, surface in enumerate(model.surfaces):
             gap = abs(value - here.flow.level(surface.name))
-            if surface.observable == observable and j != own and gap < _NO_LENGTH:
+            if surface.observable == observable and j != own and gap < NO_LENGTH:
                 return True
     return False
 

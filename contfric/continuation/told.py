@@ -1,0 +1,129 @@
+"""How near to a sliding event the signs of slopes and multipliers are told.
+
+At a sliding event at which a segment comes in, two curves cross. A segment that leaves a surface and comes
+back to it (a contact that is touched, a slide that grazes rest) may have no length: its equation is
+``tau g(tau, z) = 0``, and ``tau = 0`` solves it all along a curve of its own. At a distance d before the
+crossing the smallest singular value of the equations is ``c d``. A point solved to the rounding e is off by
+``e / (c d)``, and its tangent, with it its slope and its multipliers, by ``e / (c d)^2``: rounding as a
+whole from the root of e on. There signs say nothing, nor does Newton's method stay on one curve.
+
+And where the depth of the touch, which is of order ``tau^2``, is what the parameter drives, so is the
+parameter's distance to the event: its slope vanishes at the event with d itself, and has either sign in
+what is rounding.
+
+What is so near to a sliding event that the parameter does not tell it from that belongs to it
+(:func:`contfric.continuation.locate.belongs_to`). So nothing is lost if signs are taken where that begins:
+there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 1e-6 for c of order 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.side import first_point, point_before
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+
+#: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
+#: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
+SAME_LOCATION = 1e-7
+#: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
+SAME_VALUE, SAME_FOLD = 1e-9, 1e-4
+#: A segment this short has no length: an event at which it comes in is located to the root of rounding.
+NO_LENGTH = 1e-6
+#: A multiplier this large is that of an exit without a rate.
+_INFINITE = 1e8
+#: Share of the widest distance that is taken: a parabola predicts the parameter there.
+_WITHIN = 0.9
+#: Most that a point may be off its prediction, in distances to the event: beyond that it may lie on the other
+#: curve (as for a step of the march).
+_MISS = 0.3
+
+
+def last_told(
+    orbit: Orbit, before: Point, after: Point, beyond: Point, settings: Settings
+) -> Point | None:
+    """Return the last point of a step at which the signs of slopes and multipliers are told, or None.
+
+    Parameters
+    ----------
+    before, after : the ends of the step
+    beyond : the sliding event within it; ``after`` where there is none
+
+    Notes
+    -----
+    Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event it
+    is infinite, or its sign is that of a rate that is rounding.
+    """
+    here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    if beyond is not after and _comes_in(here):
+        told = _told_before(orbit, before, beyond, settings)
+        if told is not None:
+            return told
+    if not np.isfinite(beyond.tests[-EXTRA:]).all():
+        return None
+    if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
+        return beyond
+    return _if_finite(point_before(here, beyond, SAME_LOCATION, settings))
+
+
+def _comes_in(here: Orbit) -> bool:
+    """Tell whether a segment has no length at an event."""
+    return bool(np.min(here.ends[:, 0] - here.cycle[:, 0]) < NO_LENGTH)
+
+
+def _if_finite(point: Point | None) -> Point | None:
+    return point if point is not None and np.isfinite(point.tests[-EXTRA:]).all() else None
+
+
+def _told_before(orbit: Orbit, before: Point, event: Point, settings: Settings) -> Point | None:
+    """Return the point before an event from which on all belongs to it; None where that is not told.
+
+    So it is where the parameter goes on through the event, as it does where no two curves cross.
+    """
+    least, length = SAME_VALUE * settings.width, event.arc - before.arc
+    if abs(event.value - before.value) <= least and length <= SAME_FOLD:
+        return before
+    # where two curves cross the parameter leaves the event with the square of the distance
+    bend = abs(event.value - before.value - before.slope * length) / length**2
+    back = min(SAME_FOLD, 0.5 * length, float(np.sqrt(least / bend)) if bend > 0.0 else np.inf)
+    while back > SAME_LOCATION:
+        point = _point_at(orbit, before, event, _WITHIN * back, settings)
+        left = np.inf if point is None else abs(event.value - point.value)
+        if left <= least:
+            return point
+        back *= 0.5 if point is None else min(0.5, least / left)
+    return None
+
+
+def _point_at(
+    orbit: Orbit, before: Point, event: Point, back: float, settings: Settings
+) -> Point | None:
+    """Solve for the point at a distance before an event; None if Newton goes astray.
+
+    It is predicted by the parabola through both places with the tangent at the first one: that at the event
+    is rounding, or that of another curve.
+    """
+    length = event.arc - before.arc
+    s = length - back
+
+    def along(
+        first: FloatArray, last: FloatArray, rate: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        bend = (last - first - length * rate) / length**2
+        return first + s * (rate + s * bend), rate + 2.0 * s * bend
+
+    joints, tangent = along(before.joints, event.joints, before.tangent)
+    w, direction = along(before.w, event.w, before.direction)
+    vector = orbit.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] = w[0]
+    predicted = replace(orbit, joints=joints, vector=vector)
+    point = _if_finite(first_point(predicted, settings, tangent, float(direction[0])))
+    if point is None:
+        return None
+    square = float(np.sum((point.joints - joints) ** 2)) / len(joints)
+    miss = np.sqrt(square + float((point.w - w) @ (point.w - w)) * settings.scale)
+    return replace(point, arc=event.arc - back) if miss < _MISS * back else None
