@@ -35,7 +35,9 @@ FINER = 10.0
 #: UNBOUNDED ones stand where a step has passed a size.
 SAME, LOOSE = 1e-9, {"SINGULAR": 1e-6, "UNBOUNDED": 1e-6}
 #: A branch meets its parent at a vertex, where its equations are singular and the state is good to the
-#: root of rounding, times the curvature; everywhere else points are solved.
+#: root of rounding, times the curvature; everywhere else points are solved. An end at an event is good to
+#: what the event says that it is accurate to, if that lies between the two: where its equations are singular,
+#: too, the state is known to the root of rounding, though a bound of the parameter may be far above that.
 AT_VERTEX, SOLVED = 1e-4, 1e-8
 #: Ends that say that something went wrong, not that something happened. SINGULAR is none where the
 #: orbits are degenerate; it is counted.
@@ -202,13 +204,15 @@ def off(branch: cf.Branch, fine: cf.Branch) -> tuple[float, int]:
     """Return the largest distance of a point to the finer branch, and the index of the point.
 
     In units of the most by which a smooth curve leaves its chord: length times angle between
-    neighbouring chords (8 times what a circle does), and what a point is good to.
+    neighbouring chords (8 times what a circle does), and what the point is good to, or the end of the finer
+    branch where the chord is its first or last one.
     """
     width = 1.0 / max(float(np.ptp(fine.values)), LEAST_RANGE)
     a, b = _points(branch, width), _points(fine, width)
     chord = np.diff(b, axis=0)
     length = np.linalg.norm(chord, axis=1)
     keep = length > 0.0
+    end_good = _of_ends(fine, int(np.count_nonzero(keep)))
     foot, chord, length = b[:-1][keep], chord[keep], length[keep]
     turn = _angles(chord, length)
     worst, at = 0.0, 0
@@ -217,7 +221,7 @@ def off(branch: cf.Branch, fine: cf.Branch) -> tuple[float, int]:
         from_foot = a[k] - foot
         share = np.clip(np.sum(from_foot * chord, axis=1) / length**2, 0.0, 1.0)
         gap = np.linalg.norm(from_foot - share[:, None] * chord, axis=1)
-        units = float(np.min(gap / (length * turn + good[k])))
+        units = float(np.min(gap / (length * turn + np.maximum(good[k], end_good))))
         if units > worst:
             worst, at = units, k
     return worst, at
@@ -226,11 +230,20 @@ def off(branch: cf.Branch, fine: cf.Branch) -> tuple[float, int]:
 def _good_to(branch: cf.Branch) -> FloatArray:
     """Return what each point is good to; where the amplitude grows without bound the last one is free."""
     good = np.full(len(branch), SOLVED)
-    for end, k in zip(branch.ends, (0, -1), strict=True):
-        if end.reason.name in ("BP", "PD"):
+    for (reason, _, accuracy), k in zip(_ends(branch), (0, -1), strict=True):
+        good[k] = max(SOLVED, min(accuracy, AT_VERTEX))
+        if reason in ("BP", "PD"):
             good[k] = AT_VERTEX
-        elif end.reason.name == "UNBOUNDED":
+        elif reason == "UNBOUNDED":
             good[k] = np.inf
+    return good
+
+
+def _of_ends(branch: cf.Branch, chords: int) -> FloatArray:
+    """Return what the first and the last chord are good to, by the events at which they end; 0 for others."""
+    good = np.zeros(chords)
+    for (_, _, accuracy), k in zip(_ends(branch), (0, -1), strict=True):
+        good[k] = max(good[k], min(accuracy, AT_VERTEX))
     return good
 
 
