@@ -21,6 +21,9 @@ install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --
 .DEFAULT_GOAL := help
 .PHONY: help setup kernels wheel demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
+# What is imported is compiled once, not by each of the programs that the tests start, even where this is set:
+# without its bytecode scipy alone takes three times as long to load.
+unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make demo     the bifurcation diagram of Fig. 5, from one simulated orbit, in $(DEMO)/"
