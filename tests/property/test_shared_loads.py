@@ -25,20 +25,25 @@ def rest_of(rng: np.random.Generator, ratio: float) -> Rest:
 
 
 def all_solutions(rest: Rest) -> list[str]:
-    """Return all states of the contacts that obey every condition, by trying them all."""
+    """Return all states of the contacts that obey every condition, by trying them all.
+
+    Which stick is tried one by one, the directions of those that slide at once.
+    """
     k, found = len(rest.free), []
-    for letters in itertools.product("spn", repeat=k):
-        stuck = [j for j in range(k) if letters[j] == "s"]
-        force = np.array([{"s": 0.0, "p": -1.0, "n": 1.0}[a] for a in letters]) * rest.pulls[1]
-        if stuck:
-            block = rest.mobility[np.ix_(stuck, stuck)]
-            force[stuck] = -np.linalg.solve(block, (rest.free + rest.mobility @ force)[stuck])
-        moved = rest.free + rest.mobility @ force
-        sticks = all(abs(force[j]) <= rest.static[j] + 1e-12 for j in stuck)
-        up = all(moved[j] >= -1e-12 for j in range(k) if letters[j] == "p")
-        down = all(moved[j] <= 1e-12 for j in range(k) if letters[j] == "n")
-        if sticks and up and down:
-            found.append("".join(letters))
+    for sticks in itertools.product([True, False], repeat=k):
+        stuck = np.array(sticks)
+        sense = np.array(list(itertools.product([-1.0, 1.0], repeat=k - sum(sticks))))
+        force = np.zeros((len(sense), k))
+        force[:, ~stuck] = np.where(sense > 0.0, rest.pulls[1][~stuck], -rest.pulls[1][~stuck])
+        block = rest.mobility[np.ix_(stuck, stuck)]
+        held = (rest.free + force @ rest.mobility.T)[:, stuck]
+        force[:, stuck] = -np.linalg.solve(block, held.T).T
+        moved = rest.free + force @ rest.mobility.T
+        holds = np.all(np.abs(force[:, stuck]) <= rest.static[stuck] + 1e-12, axis=1)
+        slides = np.all(moved[:, ~stuck] * sense <= 1e-12, axis=1)
+        for signs in sense[holds & slides]:
+            letters = iter("n" if sign > 0.0 else "p" for sign in signs)
+            found.append("".join("s" if there else next(letters) for there in sticks))
     return found
 
 
