@@ -8,6 +8,7 @@ import numpy as np
 
 from contfric.continuation.branch import Branch
 from contfric.continuation.report import ROUGH
+from contfric.continuation.standing_slides import STANDS, goes_nowhere
 from contfric.models.definition import FloatArray
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
@@ -79,6 +80,20 @@ def _never_lasts(branch: Branch) -> bool:
     return bool(np.any(_longest(branch, asked) < min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])))
 
 
+def _stands(branch: Branch) -> bool:
+    """Tell whether a slide stands in its equilibrium all along a branch: its orbits are those without it.
+
+    How long it stands is free, so the equations hold along a line on which the solution does not change.
+    Where it moves, its acceleration grows at least with the distance.
+    """
+    least = min(STANDS, _NO_SHARE * branch.arc[-1])
+    orbits = [branch[k] for k in {round(share * (len(branch) - 1)) for share in _ASKED}]
+    return any(
+        all(goes_nowhere(orbit, i, least) for orbit in orbits)
+        for i in range(branch.system.segments)
+    )
+
+
 def _repeats(branch: Branch) -> bool:
     """Tell whether the orbits of a branch are shorter ones that are run through several times.
 
@@ -139,6 +154,7 @@ _FAULTS = (
         _never_lasts,
         "a segment of it has no length anywhere: the solution of another itinerary, that touches a surface",
     ),
+    (_stands, "a slide of it goes nowhere: the solution of another itinerary, that rests"),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),

@@ -10,6 +10,7 @@ from contfric.continuation.outcomes import NoJump, outcome_at
 from contfric.continuation.places import places_of
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
+from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import entered_at, thrown_at
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
@@ -201,17 +202,17 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
             "incomplete chatter: beyond this point impacts are finitely many, and branches with any number "
             "of them come together here"
         )
+    continuous = f"{kind.meaning}: the signature changes, the solution is continuous"
     if orbit.model.composed and orbit.model.filippov:
-        return (
-            ""
-            if kind is Kind.SS
-            else f"{kind.meaning}: the signature changes, the solution is continuous"
-        )
+        return "" if kind is Kind.SS else continuous
     for place in places_of(bifurcation)[:1]:
+        whole = orbit.as_whole()
+        if goes_nowhere(whole, (place.segment + 1) % len(whole.itinerary)):
+            return continuous
         try:
-            outcome_at(orbit.as_whole(), place, kind)
+            outcome_at(whole, place, kind)
         except NoJump:
-            return f"{kind.meaning}: the signature changes, the solution is continuous"
+            return continuous
         except NotationError:
             return ""
     return ""

@@ -134,12 +134,31 @@ def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
     return bends_outward(orbit, resting.mode, test.surface, sign, end)
 
 
+def stands_still(orbit: Orbit, test: Test) -> bool:
+    """Tell whether the load stands still at a stop and moves before or after: it is extreme there.
+
+    Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.
+    """
+    resting = resting_domain(orbit.system, test)
+    if resting is None or abs(outward_rate(orbit.system, test, orbit)) >= ROUNDED:
+        return False
+    end = orbit.ends[test.segment]
+    rates = _rates_beside(orbit, resting.mode, test.surface, end)
+    return any(rate != 0.0 for rate in rates)
+
+
 def bends_outward(orbit: Orbit, mode: str, surface: str, inside: int, joint: FloatArray) -> bool:
     """Tell whether a load that stands still at its limit is beyond it before and after that.
 
     ``inside`` is the sign of the surface within it.
     """
+    before, behind = _rates_beside(orbit, mode, surface, joint)
+    return inside * (behind - before) < 0.0
+
+
+def _rates_beside(orbit: Orbit, mode: str, surface: str, joint: FloatArray) -> tuple[float, float]:
+    """Return the rates of a load a moment before and after a joint, at its state."""
     later = np.zeros_like(joint)
     later[0] = _LATER * (1.0 + orbit.period)
     before, behind = (rate_along(orbit, mode, surface, joint + s * later) for s in (-1.0, 1.0))
-    return inside * (behind - before) < 0.0
+    return before, behind

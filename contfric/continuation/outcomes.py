@@ -38,6 +38,7 @@ from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
+from contfric.continuation.standing_slides import goes_nowhere, left_out
 from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
@@ -154,6 +155,8 @@ def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
     """SS: the stop is on a surface, and the load falls."""
     model, itinerary, i = orbit.model, orbit.itinerary, place.segment
     j = (i + 1) % len(itinerary)
+    if goes_nowhere(orbit, j):
+        return Outcome(*left_out(orbit, j))
     rest = _rest_mode(orbit, i, itinerary[i][1])
     _check_held(orbit, rest, release_mode(model, rest, place.surface), orbit.ends[i])
     if model.lies_on(itinerary[j][0], itinerary[i][1]):
@@ -365,7 +368,10 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
     """Check that rest would be left with an acceleration: only then can it be held."""
-    if departs is not None and not leaving_rate(orbit, rest, departs, joint) > NO_JUMP:
+    # where nothing jumps a rate is rounding, however large
+    if departs is not None and (
+        orbit.model.filippov or not leaving_rate(orbit, rest, departs, joint) > NO_JUMP
+    ):
         raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
 
 

@@ -10,6 +10,7 @@ from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import point_before
+from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import is_rate_of, rate_along
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test, inside_sign
@@ -123,6 +124,9 @@ def _stop_after(here: Orbit, point: Point, first: int) -> int:
     test = tests[first]
     if test.margin is Margin.LASTING:
         return _hold_after(here, first)
+    for i in (test.segment, (test.segment - 1) % here.system.segments):
+        if goes_nowhere(here, i):
+            return _stop_before(here, point, i, first)
     if test.margin in (Margin.ENTRY, Margin.JOINT):
         return _grazed_stop(here, point, _grazed_wall(here, point, first))
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
@@ -133,15 +137,20 @@ def _stop_after(here: Orbit, point: Point, first: int) -> int:
         or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period
     ):
         return first
+    return _stop_before(here, point, i, first)
+
+
+def _stop_before(here: Orbit, point: Point, i: int, first: int) -> int:
+    """Return the margin of the stop that segment ``i`` begins at, if it vanishes; else ``first``."""
     before = (i - 1) % here.system.segments
-    at_stop = [
+    at_stop = (
         k
-        for k, other in enumerate(tests)
-        if other.margin is Margin.JOINT
-        and other.segment == before
+        for k, test in enumerate(here.system.tests)
+        if test.margin is Margin.JOINT
+        and test.segment == before
         and abs(point.tests[k]) < _NEARLY_REACHED
-    ]
-    return at_stop[0] if at_stop else first
+    )
+    return next(at_stop, first)
 
 
 def _hold_after(here: Orbit, first: int) -> int:

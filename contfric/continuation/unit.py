@@ -69,7 +69,7 @@ class Unit:
     half : whether the unit is half of it, the other half being its symmetry image
     duration : of the unit
     mode : mode of the slide that it begins with
-    cut : joint (t, y) at which it begins, shape (1 + n,)
+    cut : time and state at which it begins (after an impact), shape (1 + n,)
     """
 
     model: Model
@@ -134,10 +134,11 @@ def unit_of(orbit: Orbit) -> Unit:
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    longest = max(slides, key=lambda i: orbit.ends[i, 0] - orbit.cycle[i, 0])
+    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    longest = max(slides, key=lambda i: lasts[i])
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.itinerary[longest][0]
-    cut = np.array(orbit.cycle[longest])
+    cut = np.array(orbit.begins[longest])
     return Unit(orbit.model, orbit.vector, periods, half, duration, mode, cut)
 
 
@@ -191,7 +192,7 @@ def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: Piece, reason: st
 def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     """Return the segments with which the units of a whole orbit begin; None if one is not there."""
     period, whole = orbit.period, unit.model.whole_mode
-    gaps = np.abs(orbit.cycle - unit.starts(round(period / unit.duration))[:, None])
+    gaps = np.abs(orbit.begins - unit.starts(round(period / unit.duration))[:, None])
     if orbit.model.autonomous:
         gaps[:, :, 0] = 0.0
     else:

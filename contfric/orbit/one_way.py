@@ -1,9 +1,12 @@
 """Words in which something only ever grows, such as the offset of a slider that slips to one side only.
 
-A linear function ``w . y`` whose rate is, along some modes, the height of a surface on whose positive side
-all of these lie, and zero along all others, grows whenever a motion is in one of them. It is the same after
-a period, so that they last for no time: what solves the equations of such an itinerary are the orbits of the
-itinerary without these modes that just touch their limit, for every value of the parameter.
+A linear function ``w . y`` whose rate is, along some modes, a positive multiple of the height of a surface on
+whose one side all of these lie, and zero along all others, grows whenever a motion is in one of them. It is
+the same after a period, so that they last for no time: what solves the equations of such an itinerary are the
+orbits of the itinerary without these modes that just touch their limit, for every value of the parameter.
+
+Other modes on that side may conserve it: where several sliders are in parallel all stop at once, at one
+surface, and only the strongest of them slips to one side only.
 """
 
 from __future__ import annotations
@@ -43,33 +46,79 @@ def only_grows(model: Model, itinerary: Itinerary) -> tuple[str, ...]:
         dropped = {exit_ for mode, exit_ in itinerary if mode in modes}
         if not others or dropped & model.reset_by_surface.keys():
             continue
-        still = conserved(model, others)
-        if len(still) > len(conserved(model, itinerary)) and _explained(
-            model, still, surface, modes
-        ):
-            return modes
+        growing = _growing(model, conserved(model, others), surface, modes)
+        if growing:
+            return growing
     return ()
 
 
 def _one_sided(model: Model, itinerary: Itinerary) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield surfaces on which segments of an itinerary end, and its modes, where these lie on one side."""
+    """Yield surfaces on which segments of an itinerary end, with the modes of it on one side of them."""
     named = dict.fromkeys(mode for mode, _ in itinerary)
     for surface in dict.fromkeys(exit_ for _, exit_ in itinerary if exit_ in model.surface_by_name):
         sides = {m: {d.signs.get(surface, 0) for d in model.domains_of(m)} for m in named}
-        on_one = {mode: min(own) for mode, own in sides.items() if len(own) == 1 and own != {0}}
-        if len(set(on_one.values())) == 1:
-            yield surface, tuple(on_one)
+        for side in (1, -1):
+            modes = tuple(mode for mode, own in sides.items() if own == {side})
+            if modes:
+                yield surface, modes
 
 
-def _explained(model: Model, still: FloatArray, surface: str, modes: tuple[str, ...]) -> bool:
-    """Tell whether the rate of a combination of some functions is the height of a surface in some modes."""
-    changes, heights = [], []
+def _growing(
+    model: Model, still: FloatArray, surface: str, modes: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Return the modes in which a combination of some functions grows and falls in none; empty if none does.
+
+    Parameters
+    ----------
+    still : the functions, which all other modes conserve
+    modes : on one side of the surface; in each the rate must be a multiple of its height
+    """
+    if not len(still):
+        return ()
+    slopes, off, largest = [], [], 0.0
     for mode in modes:
-        for vector, t, y, rate in sampled_states(model, mode):
-            changes.append(still @ rate)
-            heights.append(model.view(vector).height(surface, t, y))
-    if not changes:
-        return False
-    weights = np.linalg.lstsq(np.array(changes), np.array(heights), rcond=None)[0]
-    off = np.array(changes) @ weights - heights
-    return bool(np.max(np.abs(off)) < _ZERO * np.max(np.abs(heights)))
+        samples = [
+            (still @ rate, model.view(vector).height(surface, t, y))
+            for vector, t, y, rate in sampled_states(model, mode)
+        ]
+        if not samples:
+            return ()
+        changes, heights = np.array([s[0] for s in samples]), np.array([s[1] for s in samples])
+        slope = heights @ changes / (heights @ heights)
+        slopes.append(slope)
+        off.append(changes - np.outer(heights, slope))
+        largest = max(largest, float(np.max(np.abs(heights))))
+    _, sizes, right = np.linalg.svd(np.vstack(off))
+    explained = right[int(np.sum(sizes > _ZERO * largest)) :].T
+    weights = _of_one_sign(np.array(slopes) @ explained)
+    return tuple(mode for mode, weight in zip(modes, weights, strict=True) if weight > _ZERO)
+
+
+def _of_one_sign(columns: FloatArray) -> FloatArray:
+    """Return a combination of columns without negative elements, whose sum is 1; zeros if there is none.
+
+    Examples
+    --------
+    >>> _of_one_sign(np.array([[0.0], [-2.0]]))
+    array([0., 1.])
+    >>> _of_one_sign(np.array([[1.0], [-2.0]]))
+    array([0., 0.])
+    """
+    none = np.zeros(len(columns))
+    if columns.shape[1] == 1:
+        column = columns[:, 0] if np.max(columns) >= -np.min(columns) else -columns[:, 0]
+        one_sign = np.max(column) > _ZERO and np.min(column) >= -_ZERO * np.max(column)
+        return np.maximum(column, 0.0) / np.sum(np.maximum(column, 0.0)) if one_sign else none
+    if not columns.size or np.max(np.abs(columns)) <= _ZERO:
+        return none
+    from scipy.optimize import linprog
+
+    found = linprog(
+        np.zeros(columns.shape[1]),
+        A_ub=-columns,
+        b_ub=none,
+        A_eq=columns.sum(axis=0)[None],
+        b_eq=[1.0],
+        bounds=(None, None),
+    )
+    return np.asarray(columns @ found.x) if found.status == 0 else none

@@ -13,12 +13,15 @@ import numpy as np
 
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import state_within
 
 #: Parts of a cycle that agree to this (nondimensional) are the same solution: the root of rounding.
 SAME_SOLUTION = 1e-5
 #: Segments shorter than this have no length: a slide that vanishes is located to the third root of rounding
 #: (times its conditioning), a hold at a touch of rest to the second.
 SHORT = 1e-3
+#: Where a segment is asked for a third state, as a share of it: no whole number of it are a whole segment.
+_INSIDE = 0.381966
 
 
 def resting_modes(orbit: Orbit) -> set[str]:
@@ -41,9 +44,9 @@ def time_unit(orbit: Orbit) -> float:
 def slides_of(orbit: Orbit) -> list[int]:
     """Return the segments with which slides of some length begin, joined over a touch of rest.
 
-    Segments of rest are left out, and those of no length; a segment that goes on in the mode and from
-    the state in which the one before it ended is a part of that. Where there are joints on sections slides
-    begin there.
+    Segments of rest are left out, those of no length, and those that stand still; a segment that goes on in
+    the mode and from the state in which the one before it ended is a part of that. Where there are joints on
+    sections slides begin there.
     """
     sliding = resting_modes(orbit)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
@@ -58,9 +61,21 @@ def slides_of(orbit: Orbit) -> list[int]:
         goes_on = (
             orbit.itinerary[before][0] == mode and np.max(gap) < SAME_SOLUTION and len(some) > 1
         )
-        if mode not in sliding and not goes_on:
+        if mode not in sliding and not goes_on and not stands_still(orbit, i):
             found.append(i)
     return found or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]
+
+
+def stands_still(orbit: Orbit, i: int) -> bool:
+    """Tell whether a segment stays where it begins: a slide that stands in its equilibrium.
+
+    The solution is the same as at rest. What moves and comes back to where it began is elsewhere in between.
+    """
+    begin, end = orbit.begins[i], orbit.ends[i]
+    if orbit.model.autonomous or np.max(np.abs(end[1:] - begin[1:])) >= SAME_SOLUTION:
+        return False
+    inside = state_within(orbit, i, _INSIDE * float(end[0] - begin[0]))
+    return bool(np.max(np.abs(inside - begin[1:])) < SAME_SOLUTION)
 
 
 def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
@@ -71,7 +86,7 @@ def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False)
     symmetry = orbit.model.symmetry
     if rest or (mirrored and symmetry is None):
         return False
-    starts = orbit.cycle[slides]
+    starts = orbit.begins[slides]
     ahead = np.roll(starts, -count, axis=0)
     ahead[len(starts) - count :, 0] += orbit.period
     ahead[:, 0] -= orbit.period / turns
@@ -100,7 +115,8 @@ class Outline:
     periods : shortest period, in periods of the excitation; without one it is of no importance
     cycle : period of the excitation; infinite without one
     starts : ndarray, shape (k, 1 + n)
-        Time and state at the start of each slide; times are those of the excitation, zero without one.
+        Time and state at the start of each slide, after an impact (a slide of no length may lie between);
+        times are those of the excitation, zero without one.
     images : ndarray, shape (k, 1 + n)
         The same for the symmetry image; ``starts`` if the model has no symmetry.
     angles : columns of angles, the same a turn later
@@ -179,7 +195,7 @@ def outline_of(orbit: Orbit) -> Outline:
         return _at_one_phase(whole)
     slides = slides_of(whole)
     turns = repetitions(whole, slides)
-    starts = np.array(whole.cycle[slides[: len(slides) // turns]])
+    starts = np.array(whole.begins[slides[: len(slides) // turns]])
     cycle = np.inf if model.autonomous else whole.period / whole.periods
     starts[:, 0] = 0.0 if model.autonomous else starts[:, 0] % cycle
     images = starts

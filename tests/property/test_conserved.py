@@ -8,6 +8,7 @@ import pytest
 import contfric as cf
 from contfric.models.evaluate import floats
 from contfric.orbit.conserved import conserved, kept_by
+from contfric.orbit.one_way import only_grows
 from contfric.orbit.simulation import Trajectory
 from contfric.signature import canonical_itinerary
 
@@ -208,3 +209,44 @@ def test_where_sliders_begin_to_slip_the_stuck_branch_is_found_from_the_slipping
     assert len([b for b in diagram.branches if not b.mirrored]) == 2
     assert not diagram.loose_ends
     assert diagram.verify(restarts=2).faults == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_strongest_of_parallel_sliders_begins_to_creep_while_the_others_slip_both_ways(
+    seed: int,
+) -> None:
+    """All stop at one surface (x' = 0), and only the strongest one has slipped to one side alone."""
+    draw = np.random.default_rng([47, seed])
+    about = {"W": 1.029, "k": 1.123, "c": 0.0463, "kt": 0.596, "S": 0.0405, "n": 1.803, "m": 3.598}
+    params = {name: value * draw.uniform(0.99, 1.01) for name, value in about.items()}
+    orbit = cf.find_orbit("iwan", params | {"F": 0.274}, state=[0.05, 0, 0.05, 0.05, 0.05])
+    diagram = cf.explore(orbit, "F", (0.25, 0.3), max_periods=1)
+    assert not diagram.loose_ends
+    assert diagram.verify(restarts=1).passed
+    ends = [end for branch in diagram.branches for end in branch.ends if "SHAKE" in end.reason.name]
+    assert ends and all(end.bifurcation is not None for end in ends)
+    event = ends[0].bifurcation
+    assert event is not None
+    limit = params["m"] * params["S"] / params["kt"]
+    assert np.max(np.abs(event.orbit.cycle[:, 5])) == pytest.approx(limit, abs=1e-9)
+    # just beyond it the strong one slips, and to one side only
+    time, *state = event.orbit.cycle[0]
+    beyond = event.params | {"F": event.params["F"] * (1.0 + 1e-6)}
+    run = cf.simulate("iwan", beyond, state=state, time=time, periods=20)
+    assert len({exit_ for _, exit_ in run.itinerary} & {"strong+", "strong-"}) == 1
+
+
+def test_what_grows_on_one_side_grows_in_some_of_its_modes_only() -> None:
+    model = cf.load_model("iwan")
+    up = (("pps", "strong+"), ("ppp", "weak"))
+    down = (
+        ("sss", "weak-"),
+        ("nss", "middle-"),
+        ("nns", "weak"),
+        ("sss", "weak+"),
+        ("pss", "middle+"),
+    )
+    assert only_grows(model, up + down) == ("ppp",)
+    both = (("nns", "strong-"), ("nnn", "weak"))
+    assert only_grows(model, up + down[:2] + both + down[3:]) == ()
+    assert only_grows(model, (("pps", "weak"), *down)) == ()

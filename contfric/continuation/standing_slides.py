@@ -1,0 +1,48 @@
+"""Slides that stand in their equilibrium: what a slide is whose amplitude has shrunk to nothing.
+
+Where no force but a spring's acts on what slides, a slide from a stop just beyond the limit of rest lasts
+half a natural period however small it is: it ends inside the limit, by as much. As its amplitude shrinks to
+nothing its margins and those of the stops at both of its ends vanish together, each as a multiple of one
+number. So which of them is located first is rounding. It is one event: at the stop before the slide the load
+is at its limit (SS). Without the slide the solution is the same.
+"""
+
+from __future__ import annotations
+
+from contfric.continuation.touching import rate_along
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.system import Margin, Test
+from contfric.signature.edits import Edit, drop
+from contfric.signature.holds import is_hold
+
+#: Acceleration below which a slide does not move: where Newton fails just before the event, what is left.
+STANDS = 1e-5
+
+
+def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
+    """Tell whether segment ``i`` is a slide between two stops without acceleration at either of them.
+
+    Accelerations below ``least`` are none.
+    """
+    mode, exit_ = orbit.itinerary[i]
+    if not orbit.model.filippov or is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:
+        return False
+    at_end = Test(Margin.EXIT, i, exit_)
+    if orbit.itinerary[i - 1][1] != exit_ or at_end not in orbit.system.tests:
+        return False
+    left = abs(float(orbit.margins[orbit.system.tests.index(at_end)]))
+    return max(left, abs(rate_along(orbit, mode, exit_, orbit.begins[i]))) < least
+
+
+def left_out(orbit: Orbit, i: int) -> tuple[Edit, dict[tuple[int, int], FloatArray], str]:
+    """Return the edit that leaves a slide out that goes nowhere, the joints that it moves, and a reason.
+
+    What follows it, a rest inside the limit, begins at the stop before it.
+    """
+    behind = (i + 1) % len(orbit.itinerary)
+    reason = f"slide {i + 1} goes nowhere: rest instead"
+    stop = orbit.cycle[i].copy()
+    if not behind:  # the rest that follows begins the orbit
+        stop[0] -= orbit.period
+    return drop(i), {(behind, -1): stop}, reason
