@@ -23,7 +23,7 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 from __future__ import annotations
 
 from contfric.continuation.shared_outcomes import in_other_order, limit_after, with_other_state
-from contfric.continuation.zero_acceleration import touch_of
+from contfric.continuation.zero_acceleration import only_comes_back, touch_of
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
@@ -106,6 +106,8 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
     """Return the edit where a surface is touched inside: the contact changes its state, for no time."""
     model, (mode, exit_) = orbit.model, orbit.itinerary[i]
     touch = touch_of(orbit, i, surface)
+    if only_comes_back(orbit, i, surface):
+        raise NotationError(f"segment {i + 1} leaves {surface} and comes back, and does not touch it between")
     other, back = _there_and_back(model, mode, surface)
     edit = split(i, surface, (other, back), (mode, exit_))
     joints: Joints = {(i, 0): touch, (i, 1): touch}

@@ -42,6 +42,9 @@ _NEARLY = 1e-2
 _INSIDE = (1e-2, -1e-2, 1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5)
 #: Steps of Newton's method at one value, and trials of the value.
 _STEPS, _TRIALS = 8, 12
+#: How far, in second smallest singular values, the reduced equations are solved for: Newton's method converges
+#: to a distance of that value over the second derivative (Kantorovich), which is of order one or less.
+_REACH = 10.0
 #: Second trial of the value, and how far from the first it may be found (relative to 1 + its size).
 _TRIAL, _FAR = 1e-6, 1e-2
 #: What is left of the equations at an orbit of the family, and of w F there. (A damping q that is nearly
@@ -147,17 +150,20 @@ def _next_to(whole: Orbit, active: int, within: float) -> Family | None:
     left, size, right = np.linalg.svd(by_joints)
     if size[-1] > _NEARLY * size[0]:
         return None
+    distances = [d for d in _INSIDE if abs(d) < _REACH * size[-2]]
+    if not distances:  # several nearly vanish, as where a slide ends that is about to: no family is told there
+        return None
     border = left[:, -1], right[-1]
     along = right[-1].reshape(whole.joints.shape)
     along = along * np.sqrt(len(along)) / np.linalg.norm(along)
-    first = replace(whole, joints=whole.joints + _INSIDE[0] * along)
+    first = replace(whole, joints=whole.joints + distances[0] * along)
     joints = _reduced(first, whole.vector, border)
     if joints is None:
         return None
     residual, _, _ = equations_at(whole.system, joints, whole.vector, False)
     if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 near an orbit of a family
         return None
-    for distance in _INSIDE:
+    for distance in distances:
         moved = replace(whole, joints=whole.joints + distance * along)
         found = _at_value(moved, active, border)
         if found is not None and found.orbit.admissible and not found.orbit.symmetric:

@@ -166,6 +166,23 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     return joint_within(orbit, i, next(t for t, v in found if sign * (v - level) <= least + near))
 
 
+def only_comes_back(orbit: Orbit, i: int, surface: str) -> bool:
+    """Tell whether a segment leaves a surface and comes back to it, and does not come near it between.
+
+    A slide that is about to vanish has small velocities all along: each of its stationary points is farther
+    from the surface than what is before and after it, and touches nothing, whatever counts as small.
+    """
+    observable = orbit.model.surface_by_name[surface].observable
+    level, sign = orbit.flow.level(surface), inside_sign(orbit.model, orbit.itinerary[i][0], surface)
+    inside = [value for _, value in stationary_values(orbit, i, observable)]
+    begin, end = (
+        orbit.flow.observe(observable, float(joint[0]), joint[1:])
+        for joint in (orbit.begins[i], orbit.ends[i])
+    )
+    heights = [sign * (value - level) for value in (begin, *inside, end)]
+    return bool(inside) and all(b > max(a, c) for a, b, c in zip(heights, heights[1:], heights[2:]))
+
+
 def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:
     """Tell whether a rest whose load touches a surface at its start does so at the same height later.
 
