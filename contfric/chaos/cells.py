@@ -30,6 +30,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.sides import surfaces_after
 from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import HOLD_PERIODS, TablesType
+from contfric.orbit.walls import walls_of
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
@@ -160,15 +161,6 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
         rise,
     )
     return solutions.stage[k] == BEHIND and cycle >= solutions.end[k]
-
-
-@helper
-def walls_of(tables):  # type: ignore[no-untyped-def]
-    """Return 1 if a model has resets: a wall bounds every mode."""
-    walls = 0
-    for k in range(tables.observables.shape[0]):
-        walls = 1 if tables.bounds[0, k] == 2 else walls
-    return walls
 
 
 @helper

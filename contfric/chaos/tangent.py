@@ -55,7 +55,7 @@ from contfric.orbit.trajectory import (
     leads_to_rest,
     whole_turns,
 )
-from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_pressed, lying_on
+from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_crossed, is_pressed, lying_on
 
 #: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
 #: QUIET, CHATTER), or the integration broke down.
@@ -161,7 +161,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
-        landed = tables.landed[surface]
+        landed = tables.landed[mode, surface]
         code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
         if tables.flights[mode] >= 0:
             code = code_ahead(functions, tables, mode, surface, t, y, p, period, workspace)
@@ -192,7 +192,7 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
                 copy_state(walk.end, workspace.after)
             why = CHATTER if pressed else ARRIVED
             return why, surface, following, duration, turns, t
-        if reset:
+        if reset or is_crossed(functions, tables, mode, surface, t, y, p, period, workspace):
             return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
         walk.meets[0] = SINGLY  # from here on it was not asked for

@@ -187,11 +187,12 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     orbit, kind = bifurcation.orbit, bifurcation.kind
     if kind not in (Kind.SS, Kind.AS, Kind.GS) or orbit.system.holds:
         return ""
-    if any(test.surface in orbit.model.reset_by_surface for test in bifurcation.tests):
-        struck = next(
-            t.surface for t in bifurcation.tests if t.surface in orbit.model.reset_by_surface
-        )
-        met = next(t for t in bifurcation.tests if t.surface == struck)
+    modes, model = [mode for mode, _ in orbit.system.itinerary], orbit.model
+    struck = [
+        t for t in bifurcation.tests if model.reset_at(modes[t.segment], t.surface) is not None
+    ]
+    if struck:
+        met = struck[0]
         if thrown_at(orbit, met) or entered_at(orbit.system, met):
             return bifurcation.meaning
         return "grazing impact: the wall is just touched"

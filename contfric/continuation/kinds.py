@@ -9,7 +9,7 @@ interior   segment that stays on a surface         AS: the stick touches its lim
                                                    surface is another contact's, and the stick goes on
 interior   other segment, surface that switches    GS: the slide touches rest inside, a slider its limit
 interior   surface with the same field behind      T
-any        surface with a reset                    GS: a grazing impact
+any        surface with a reset in the mode        GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      a reset chooses its mode by that side   SS: the map jumps (entry: the same)
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
@@ -64,7 +64,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
         return Kind.SS
     if test.margin is Margin.ENTRY:
         return Kind.CS
-    if test.surface in model.reset_by_surface:
+    if model.reset_at(mode, test.surface) is not None:
         return Kind.CS if is_corner(system, test, orbit) else Kind.GS
     if test.margin is Margin.JOINT and test.surface in model.section_surfaces:
         resting = resting_domain(system, test)

@@ -124,7 +124,7 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         )
     if place.margin is Margin.ENTRY:
         raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
-    if place.margin is Margin.JOINT and place.surface in orbit.model.reset_by_surface:
+    if place.margin is Margin.JOINT and orbit.model.reset_at(mode, place.surface) is not None:
         where = f"where segment {place.segment + 1} ends"
         raise NotationError(f"the wall {place.surface} is met {where}")
     if orbit.model.composed and orbit.model.filippov:
@@ -139,7 +139,7 @@ def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
         return Outcome(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
     if kind is Kind.SS:
         return _stop_on_surface(orbit, place)
-    if place.surface in orbit.model.reset_by_surface:
+    if orbit.model.reset_at(mode, place.surface) is not None:
         return _grazing_impact(orbit, place)
     if place.margin is Margin.JOINT:
         raise NoJump(f"{place.surface} is touched at a section: nothing can be held there")

@@ -172,7 +172,7 @@ def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
         if (
             other.margin is Margin.EXIT
             and other.segment == met % here.system.segments
-            and other.surface in here.model.reset_by_surface
+            and here.model.reset_at(here.itinerary[other.segment][0], other.surface) is not None
             and abs(point.tests[k]) < _NEARLY_REACHED
         ):
             return k

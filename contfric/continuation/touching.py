@@ -126,8 +126,8 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
 def chosen_at(system: System, test: Test) -> str:
     """Return the surface of the reset that chooses the mode after it by the side of a test; else nothing."""
     joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
-    exit_ = system.itinerary[joint % len(system.itinerary)][1]
-    reset = system.model.reset_by_surface.get(exit_)
+    mode, exit_ = system.itinerary[joint % len(system.itinerary)]
+    reset = system.model.reset_at(mode, exit_)
     chooses = reset is not None and test.surface in reset.chooses_by
     return exit_ if chooses and test.margin in (Margin.JOINT, Margin.ENTRY) else ""
 
@@ -141,7 +141,7 @@ def entered_at(system: System, test: Test) -> str:
     model = system.model
     if model.composed or test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return ""
-    reset = model.reset_by_surface.get(test.surface)
+    reset = model.reset_at(system.itinerary[test.segment][0], test.surface)
     if reset is not None and reset.changes:  # one that only says the mode moves no state
         return ""
     mode = model.whole_mode(system.itinerary[test.segment][0])
@@ -159,7 +159,7 @@ def thrown_at(orbit: Orbit, test: Test) -> str:
     An impact changes nothing at a touch, as ``v -> -e v`` at v = 0. A reset off its surface does, and so does
     one along it (a neuron that fires begins at x = 0, whatever x was).
     """
-    reset = orbit.model.reset_by_surface.get(test.surface)
+    reset = orbit.model.reset_at(orbit.itinerary[test.segment][0], test.surface)
     if reset is None or reset.wraps or test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return ""
     try:

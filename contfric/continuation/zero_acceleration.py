@@ -156,7 +156,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     rises = orbit.flow.rate(orbit.itinerary[i][0], observable, float(start[0]), start[1:])
     gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
     # after a reset that has just touched, the solution is at its start again: no touch of its own
-    rests = surface not in model.reset_by_surface
+    rests = model.reset_at(orbit.itinerary[i][0], surface) is None
     if rests and abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
         return np.array(start)  # it begins with the touch
     if not found:

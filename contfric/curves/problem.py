@@ -212,7 +212,7 @@ def _tangential(test: Test, orbit: Orbit) -> Test | None:
     """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
     model, itinerary = orbit.model, orbit.system.itinerary
     if test.margin is not Margin.JOINT or not (
-        model.filippov or itinerary[test.segment][1] in model.reset_by_surface
+        model.filippov or model.reset_at(*itinerary[test.segment]) is not None
     ):
         return None
     exits = (

@@ -37,7 +37,7 @@ def joined_modes(description: Description) -> Mapping[str, str]:
     """Return, for each mode, the first mode that is one with it: itself, most often.
 
     Two modes are one where their fields are the same formulas, no reset and no motion on a surface lies
-    between them, and the surfaces that end them are the same.
+    between them, and the surfaces that end them, and the resets that act in them, are the same.
     """
     return _joined(_Key(description))
 
@@ -67,11 +67,14 @@ def _joined(key: _Key) -> dict[str, str]:
         return {**first, **_halves(description)}
     places = {tuple(d.signs.items()): d.mode for d in domains}
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
+    acts = description.acts.items()
+    mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
     going_on = True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
-            if first[a.name] == first[b.name] or lies_on[a.name] != lies_on[b.name]:
+            alike = lies_on[a.name] == lies_on[b.name] and mapped[a.name] == mapped[b.name]
+            if first[a.name] == first[b.name] or not alike:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
             between = _between(description, domains, places, both, (a.name, b.name))

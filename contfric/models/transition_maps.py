@@ -183,13 +183,19 @@ class TransitionMaps(SectionMaps):
             return False
         return not reset.modes or domain.own_mode in reset.modes
 
-    def ends_at(self, domain: Domain, surface: str) -> bool:
-        """Return whether motion meets a reset that acts in other modes only, where its own mode ends.
+    def reset_at(self, mode: str, surface: str) -> Reset | None:
+        """Return the reset that acts where motion in a mode ends at a surface; None if it passes."""
+        reset = self.reset_by_surface.get(surface)
+        return None if reset is None or (reset.modes and mode not in reset.modes) else reset
 
-        A surface with a reset maps all that it bounds: none of its joints is one where nothing happens.
+    def ends_at(self, domain: Domain, surface: str) -> bool:
+        """Return whether motion meets a reset that acts in other modes only, and no mode holds behind it.
+
+        Motion that a reset does not map passes its surface, as it passes any other.
         """
         bounded = surface in self.reset_by_surface and self._side_of[domain.own_mode, surface] != 0
-        return bounded and not self.maps_at(domain, surface)
+        passes = (domain.name, surface) in self.transitions
+        return bounded and not passes and not self.maps_at(domain, surface)
 
     @cached_property
     def _side_of(self) -> dict[tuple[str, str], int]:
@@ -293,7 +299,7 @@ class TransitionMaps(SectionMaps):
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]
-        if sign == 0 or self.maps_at(domain, surface.name) or self.ends_at(domain, surface.name):
+        if sign == 0 or self.maps_at(domain, surface.name):
             return None
         mode = domain.own_mode
         through = {**domain.signs, surface.name: -sign}

@@ -13,32 +13,35 @@ from contfric.signature.holds import is_hold, mirror_exit
 Itinerary = tuple[tuple[str, str], ...]
 
 
-def first_entry(model: Model, itinerary: Itinerary, half: bool) -> str:
-    """Return the surface through which the first segment of a turn is entered."""
-    if not half or model.symmetry is None:
-        return itinerary[-1][1]
-    inverse = {image: name for name, image in model.symmetry.surfaces.items()}
-    return mirror_exit(itinerary[-1][1], inverse)
+def joints_before(model: Model, itinerary: Itinerary, half: bool) -> Itinerary:
+    """Return the mode before each segment of a turn, and the surface through which it is entered."""
+    last = mode, surface = itinerary[-1]
+    if half and model.symmetry is not None:
+        inverse = {image: name for name, image in model.symmetry.surfaces.items()}
+        last = mirror_mode(model)[mode], mirror_exit(surface, inverse)
+    return last, *itinerary[:-1]
 
 
 def beginnings(
     model: Model,
     itinerary: Itinerary,
     exits: list[str],
-    entered: list[str],
-    half: bool,
+    joints: Itinerary,
     held: dict[int, Hold],
 ) -> dict[str, NDArray[np.int64]]:
     """How holds are left and segments begin: ``departs``, ``resets`` and ``returns`` of a layout."""
-    modes = [mode for mode, _ in itinerary]
-    before = [mirror_mode(model)[modes[-1]] if half else modes[-1], *modes[:-1]]
+    modes, before, entered = (
+        [m for m, _ in itinerary],
+        [m for m, _ in joints],
+        [s for _, s in joints],
+    )
     departs, resets, returns = (np.full(len(itinerary), empty) for empty in (-1, -1, 0))
     for i, row in enumerate(zip(modes, before, exits, entered, strict=True)):
         if i in held:
             departs[i] = model.mode_index[held[i].departs]
             continue
         returns[i] = _returns(model, *row)
-        if row[3] in model.reset_by_surface:
+        if model.reset_at(row[1], row[3]) is not None:
             resets[i] = model.surface_index[row[3]]
     if np.all(
         returns
@@ -57,7 +60,7 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
     if is_hold(entered):
         return 1
     rest = model.rests_on(exit_)
-    reset = model.reset_by_surface.get(entered)
+    reset = model.reset_at(before, entered)
     if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration
         return 0
     if reset is not None and exit_ in reset.lands:
@@ -69,12 +72,12 @@ def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> 
 
 
 def entry_rows(
-    model: Model, itinerary: Itinerary, entered: list[str], domains: tuple[str, ...]
+    model: Model, itinerary: Itinerary, joints: Itinerary, domains: tuple[str, ...]
 ) -> list[tuple[int, ...]]:
     """Rows of the entry margins: surfaces that a reset may lead across, and that bound the mode after it."""
     rows: list[tuple[int, ...]] = []
-    for i, surface in enumerate(entered):
-        reset = model.reset_by_surface.get(surface)
+    for i, (before, surface) in enumerate(joints):
+        reset = model.reset_at(before, surface)
         if reset is None or itinerary[i][0] in model.chatter_by_mode:
             continue  # what holds at rest on a wall need not hold before the impacts have come to rest
         led = {

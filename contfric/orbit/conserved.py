@@ -51,7 +51,7 @@ def conserved(model: Model, itinerary: Itinerary) -> FloatArray:
         if not model.composed and _rank(changes) == n:  # else each mode has few columns
             return np.empty((0, n))
     for surface in dict.fromkeys(
-        exit_ for _, exit_ in itinerary if exit_ in model.reset_by_surface
+        exit_ for mode, exit_ in itinerary if model.reset_at(mode, exit_) is not None
     ):
         changes = np.hstack([changes, _jumps(model, surface)])
     left, sizes, _ = np.linalg.svd(changes, full_matrices=not model.composed)

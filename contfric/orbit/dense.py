@@ -56,7 +56,7 @@ def stretches(trajectory: Trajectory) -> list[Stretch]:
             found.append(Stretch(modes[k], time, phase, state, max(0.0, float(end - time)), exits))
         if k < len(trajectory):
             time, phase, state = float(end), float(trajectory.times[k]), trajectory.states[k]
-            if exits in model.reset_by_surface:
+            if model.reset_at(modes[k], exits) is not None:
                 state = view.reset(exits, phase, state)
     return found
 

@@ -43,8 +43,8 @@ def only_grows(model: Model, itinerary: Itinerary) -> tuple[str, ...]:
         return ()
     for surface, modes in _one_sided(model, itinerary):
         others = tuple(pair for pair in itinerary if pair[0] not in modes)
-        dropped = {exit_ for mode, exit_ in itinerary if mode in modes}
-        if not others or dropped & model.reset_by_surface.keys():
+        mapped = [model.reset_at(*joint) for joint in itinerary if joint[0] in modes]
+        if not others or any(mapped):
             continue
         growing = _growing(model, conserved(model, others), surface, modes)
         if growing:

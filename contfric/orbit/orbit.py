@@ -152,13 +152,12 @@ class Orbit(MeasuredOrbit):
 
         Shape (segments, 1 + n).
         """
-        resets = self.model.reset_by_surface
-        if not resets:
+        if not self.model.resets:
             return self.cycle
         begins = self.cycle.copy()
         for i, joint in enumerate(self.cycle):
-            entry = self.itinerary[i - 1][1]
-            if entry in resets:
+            mode, entry = self.itinerary[i - 1]
+            if self.model.reset_at(mode, entry) is not None:
                 begins[i, 1:] = self.flow.reset(entry, float(joint[0]), joint[1:])
         return begins
 

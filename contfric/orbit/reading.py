@@ -71,9 +71,9 @@ def _domains(orbit: Orbit, labels: IntArray) -> list[str]:
     """Domains of the whole orbit, with its holds and impacts between them."""
     model, system = orbit.model, orbit.system
     domains: list[str] = []
-    for path, (_, exit_) in zip(_paths(orbit, labels), system.itinerary, strict=True):
+    for path, (mode, exit_) in zip(_paths(orbit, labels), system.itinerary, strict=True):
         domains += [exit_] if is_hold(exit_) else path
-        if exit_ in model.reset_by_surface:
+        if model.reset_at(mode, exit_) is not None:
             domains.append(impact_at(model, exit_))
     if system.half:
         assert model.symmetry is not None
@@ -93,18 +93,19 @@ def _start_domain(orbit: Orbit, i: int, ends: list[str]) -> str:
     ):  # at rest on a wall no side of a section is told: look a little ahead
         own = [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])]
         return _nearest(own, _signs_ahead(orbit, i, model.surface_by_name))
-    if entry not in model.reset_by_surface and not is_hold(entry):
+    reset = model.reset_at(mode, entry)
+    if reset is None and not is_hold(entry):
         return model.transitions[ends[i - 1], entry]
     begin = orbit.begins[i]
     signs = _signs_at(orbit, float(begin[0]), begin[1:].copy())
-    if entry in model.reset_by_surface:
-        before, reset = model.domain_by_name[ends[i - 1]].signs, model.reset_by_surface[entry]
+    if reset is not None:
+        before = model.domain_by_name[ends[i - 1]].signs
         slid = [s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)]
         signs |= _signs_ahead(orbit, i, slid)
     if is_hold(entry):
         after = [model.domain_by_name[d] for d in domains_after(model, mode, itinerary[i][0])]
         return _nearest(after, signs)
-    for surface in model.reset_by_surface[entry].lands:
+    for surface in () if reset is None else reset.lands:
         del signs[surface]  # the joint lies on it to rounding; the transition says the side
     own = [model.domain_by_name[d] for d in mode_domains(model, itinerary[i][0])]
     led = model.targets.get(

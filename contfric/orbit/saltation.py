@@ -124,7 +124,7 @@ def passage_at(model: Model, mode: str, surface: str, following: str) -> Passage
 
     Judged at random states on the surface, on which both modes slide as they do.
     """
-    if is_hold(surface) or surface in model.reset_by_surface or surface in model.wraps:
+    if is_hold(surface) or model.reset_at(mode, surface) is not None:
         return Passage.JUMP
     if model.whole_mode(mode) == model.whole_mode(following):
         return Passage.CONTINUOUS

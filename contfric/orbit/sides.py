@@ -37,4 +37,4 @@ def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
 @helper
 def surfaces_after(tables, mode, surface):  # type: ignore[no-untyped-def]
     """Return the surfaces that the state is on when motion in a mode has met one, as bits."""
-    return tables.landed[surface] | (tables.lies_on[mode] & tables.kept[surface])
+    return tables.landed[mode, surface] | (tables.lies_on[mode] & tables.kept[mode, surface])

@@ -239,7 +239,7 @@ def _impacts(whole: Orbit) -> FloatArray:
     """Return time and state in front of each reset that changes the state: a grazing impact changes none."""
     behind = np.roll(whole.begins[:, 1:], -1, axis=0)
     jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_SOLUTION
-    struck = [exit_ in whole.model.reset_by_surface for _, exit_ in whole.itinerary]
+    struck = [whole.model.reset_at(*joint) is not None for joint in whole.itinerary]
     return np.array(whole.ends[jumps & np.array(struck)])
 
 

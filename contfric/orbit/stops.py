@@ -21,8 +21,11 @@ _AT_JOINT = 1e-8
 
 def stopping_segments(model: Model, itinerary: Itinerary) -> list[int]:
     """Return the segments that end at a stop or at an impact, where the displacement may turn."""
-    ends = {model.stop_surface, *model.reset_by_surface}
-    return [i for i, (_, exit_) in enumerate(itinerary) if exit_ in ends]
+    return [
+        i
+        for i, joint in enumerate(itinerary)
+        if joint[1] == model.stop_surface or model.reset_at(*joint) is not None
+    ]
 
 
 def stops_of(orbit: Orbit) -> FloatArray:
@@ -61,7 +64,7 @@ def displacements(orbit: Orbit, surface: str) -> FloatArray:
             found.append((start, float(state[0])))
         state = orbit.ends[i, 1:]
         apart = flow.observe(observable, end, state) - level
-        if exit_ in model.reset_by_surface or abs(apart) < _AT_JOINT:
+        if model.reset_at(mode, exit_) is not None or abs(apart) < _AT_JOINT:
             found.append((end, float(state[0])))
     return _apart(found, orbit.period)
 
@@ -95,7 +98,7 @@ def stationary_points(orbit: Orbit) -> FloatArray:
             segment = mode, model.displacement, float(start[0]), start[1:], lasts
             _, values = orbit.flow.stationary(*segment)
         x += [*values.tolist(), float(end[1])]
-        struck += [False] * len(values) + [exit_ in model.reset_by_surface]
+        struck += [False] * len(values) + [model.reset_at(mode, exit_) is not None]
     before, after = np.roll(x, 1) - x, np.roll(x, -1) - x
     return np.asarray(np.array(x)[(before * after > 0.0) | np.array(struck)])
 

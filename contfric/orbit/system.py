@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.begins import beginnings, entry_rows, first_entry
+from contfric.orbit.begins import beginnings, entry_rows, joints_before
 from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
 from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
@@ -172,8 +172,8 @@ def build_system(
         _segment_domains(model, mode, exit_, _leads_to(i, after, holds), domains[i : i + 1])
         for i, ((mode, exit_), after) in enumerate(zip(itinerary, following, strict=True))
     ]
-    entered = [first_entry(model, itinerary, half), *(exit_ for _, exit_ in itinerary[:-1])]
-    entries = entry_rows(model, itinerary, entered, domains)
+    joints = joints_before(model, itinerary, half)
+    entries = entry_rows(model, itinerary, joints, domains)
     ending = [
         ending_sides(model, mode, exit_, _leads_to(i, after, holds), inside[i])
         for i, ((mode, exit_), after) in enumerate(zip(itinerary, following, strict=True))
@@ -198,7 +198,7 @@ def build_system(
         joint=joint,
         labels=_label_rows(model, itinerary, half, bool(domains), holds),
         pins=np.array([_pin(held.get(i), surfaces) for i in range(len(itinerary))], dtype=np.int64),
-        **beginnings(model, itinerary, exits, entered, half, held),
+        **beginnings(model, itinerary, exits, joints, held),
         lasting=np.array([i for i, _ in lasting_segments(itinerary, holds)], dtype=np.int64),
         held=np.array([hold.segment for hold in holds], dtype=np.int64),
         doubles=_rows(
@@ -345,10 +345,9 @@ def _label_rows(
     if full or model.composed:  # what bounds no mode has no side there
         return _rows([], 4)
     surfaces = [s.name for s in model.surfaces]
-    first = first_entry(model, itinerary, half)
     rows: list[tuple[int, ...]] = []
-    for i, (mode, exit_) in enumerate(itinerary):
-        entry = itinerary[i - 1][1] if i else first
+    joints = joints_before(model, itinerary, half)
+    for i, ((mode, exit_), entry) in enumerate(zip(itinerary, joints, strict=True)):
         for c, observable in enumerate(model.observables):
             clear = [
                 s.name
@@ -364,11 +363,11 @@ def _label_rows(
     return _rows(rows, 4)
 
 
-def _landed(model: Model, entry: str, c: int) -> str | None:
+def _landed(model: Model, joint: tuple[str, str], c: int) -> str | None:
     """Return the surface of observable c that a segment begins on, after a reset; else that of its entry."""
-    reset = model.reset_by_surface.get(entry)
+    reset = model.reset_at(*joint)
     if reset is None:
-        return entry
+        return joint[1]
     own = model.observables[c].name
     return next((s for s in reset.lands if model.surface_by_name[s].observable == own), None)
 

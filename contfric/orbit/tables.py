@@ -7,7 +7,7 @@ combinations of sides doubles with each surface.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -23,6 +23,8 @@ from contfric.orbit.system import IntArray
 #: Sides are the bits of one signed number of 64. Surfaces behind these, which come as solutions visit their
 #: modes, have none: no rule asks for their sides, and nothing lies on them.
 MOST_SURFACES = 62
+#: What a surface is in ``Tables.bounds`` to a mode in which it has a reset.
+MAPPED = 2
 #: A rule for the sides of surfaces as bits: (mask, value, mode that follows).
 Rule = tuple[int, int, int]
 
@@ -33,17 +35,19 @@ class Tables(NamedTuple):
     Attributes
     ----------
     observables : observable of each surface
-    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset
+    bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset in that mode
     first : first rule of each (mode, surface), and the number of rules, shape (modes * surfaces + 1,)
     rules : rows (mask, value, mode that follows): the first that the sides of all surfaces fit, as bits
     sliding : whether a mode slides on a surface; 2 if it may do so for more than a period
     lies_on : surfaces that a mode moves on, as bits
-    kept : surfaces that the state stays on where a surface is met, as bits: a reset takes it off others
+    kept : surfaces that the state stays on where a surface is met in a mode, as bits: a reset takes it off
+        others; shape (modes, surfaces)
     chatters : mode that infinitely many impacts lead to, by (mode after an impact, surface); -1 if none,
         shape (modes, surfaces)
     flights : mode that a mode of chatter is left for, -1 of others; behind these, where impacts pass their
         surface, that which it is left for below it
-    landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset
+    landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset;
+        shape (modes, surfaces)
     walls : surfaces at which a reset sends motion back, as bits
     """
 
@@ -104,7 +108,9 @@ def tables(model: Model) -> Tables:
     bounds = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)
     for k, mode in enumerate(model.modes):
         for name in cut_bounds(model)[mode.name]:
-            bounds[k, model.surface_index[name]] = 1 + (name in model.reset_by_surface)
+            bounds[k, model.surface_index[name]] = (
+                1 if model.reset_at(mode.name, name) is None else MAPPED
+            )
     first, rules = _rules(model)
     return Tables(
         np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
@@ -115,8 +121,8 @@ def tables(model: Model) -> Tables:
             [int(m.sliding) * (1 + int(moves_on(model, m))) for m in model.modes], dtype=np.int64
         ),
         np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
-        np.array([_surfaces_kept(model, s.name) for s in model.surfaces], dtype=np.int64),
-        np.array([bits_of(model, _landed(model, s.name)) for s in model.surfaces], dtype=np.int64),
+        _by_mode(model, _surfaces_kept),
+        _by_mode(model, lambda *met: bits_of(model, _landed(*met))),
         bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
         chatter_table(model, len(model.modes)),
         flight_table(model, len(model.modes)),
@@ -156,14 +162,15 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
     for (name, surface), target in model.transitions.items():
         add(name, surface, model.domain_by_name[name].signs, {surface}, target)
     for (name, surface), targets in model.targets.items():
-        if surface in model.reset_by_surface:
+        source = model.domain_by_name[name].own_mode
+        reset = model.reset_at(source, surface)
+        if reset is not None:
             for after in targets:  # after a reset the signs of the mapped state tell the domain
                 if model.domain_by_name[after].own_mode in model.chatter_by_mode:
                     continue  # found by following the impacts
                 signs, before = model.domain_by_name[after].signs, model.domain_by_name[name].signs
-                reset = model.reset_by_surface[surface]
                 slid = {s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)}
-                add(name, surface, signs, {*_landed(model, surface), *slid}, after)
+                add(name, surface, signs, {*_landed(model, source, surface), *slid}, after)
     for own in model.chatters:
         for domain, (lift, _) in product(model.domains_of(own.mode), own.ways):
             found.pop((model.mode_index[own.mode], model.surface_index[lift]), None)
@@ -226,16 +233,22 @@ def _lies_on(model: Model) -> dict[str, set[str]]:
     return found
 
 
-def _surfaces_kept(model: Model, met: str) -> int:
-    """Return the surfaces that the state stays on where one is met, as bits."""
-    reset = model.reset_by_surface.get(met)
+def _by_mode(model: Model, bits: Callable[[Model, str, str], int]) -> IntArray:
+    """Return surfaces, as bits, for each mode and surface that is met in it."""
+    rows = [[bits(model, mode.name, s.name) for s in model.surfaces] for mode in model.modes]
+    return np.array(rows, dtype=np.int64)
+
+
+def _surfaces_kept(model: Model, mode: str, met: str) -> int:
+    """Return the surfaces that the state stays on where one is met in a mode, as bits."""
+    reset = model.reset_at(mode, met)
     kept = [s.name for s in model.surfaces if reset is None or not model.changed_by(reset, s.name)]
     return bits_of(model, kept)
 
 
-def _landed(model: Model, met: str) -> Collection[str]:
-    """Return the surfaces that the state is on after one that is met."""
-    reset = model.reset_by_surface.get(met)
+def _landed(model: Model, mode: str, met: str) -> Collection[str]:
+    """Return the surfaces that the state is on after one that is met in a mode."""
+    reset = model.reset_at(mode, met)
     return {met} if reset is None else reset.lands
 
 

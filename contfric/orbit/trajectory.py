@@ -23,11 +23,19 @@ from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MOST_SURFACES, Tables
 from contfric.orbit.together import mode_together
-from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, in_flight, is_pressed, lying_on
+from contfric.orbit.walls import (
+    MOST_AT_ONCE,
+    NO_FLIGHT,
+    NO_TIME,
+    in_flight,
+    is_crossed,
+    is_pressed,
+    lying_on,
+)
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
-    [indices, table, indices, table, indices, indices, indices, indices, i8, table, indices], Tables
+    [indices, table, indices, table, indices, indices, table, table, i8, table, indices], Tables
 )
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
@@ -206,7 +214,7 @@ def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
 
     ``workspace.after`` is written over.
     """
-    on = tables.landed[surface]
+    on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
     _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
     return met >= 0 and tables.bounds[chatter, met] == 1
@@ -235,7 +243,7 @@ def sides_after(functions, tables, mode, surface, t, y, p, unit, workspace):  # 
     """Return the sides of all surfaces after an event, by which the mode that follows is known."""
     if tables.flights[mode] >= 0:
         return code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace)
-    landed, none, empty = tables.landed[surface], workspace.none, workspace.empty
+    landed, none, empty = tables.landed[mode, surface], workspace.none, workspace.empty
     return sign_code(functions, tables.observables, landed, t, y, p, none, empty)
 
 
@@ -307,7 +315,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         if reset:  # rows keep the state before it, as the joints of orbits do
             copy_state(y, rows.states[event])
             functions.reset(surface, t, rows.states[event], p, none, y, nothing)
-        on = tables.landed[surface]
+        on = tables.landed[mode, surface]
         code = sides_after(functions, tables, mode, surface, t, y, p, unit, workspace)
         target = mode_after(tables, mode, surface, code)
         if target == -1 and not reset:
@@ -327,6 +335,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             target, carry[AT_ONCE] = chatter, 0.0
         elif pressed or carry[AT_ONCE] > MOST_AT_ONCE:
             return (CHATTER if struck else IMPOSSIBLE), event, mode, cycle, t
+        if target == -1 and is_crossed(functions, tables, mode, surface, t, y, p, unit, workspace):
+            return IMPOSSIBLE, event, mode, cycle, t
         if target == -1:
             continue  # nothing leads there: the surface is touched and left to the same side
         carry[BOUNCED] = float(1 + surface) if reset else 0.0

@@ -35,6 +35,22 @@ def is_pressed(functions, tables, mode, surface, following, t, before, y, p, uni
 
 
 @helper
+def is_crossed(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Tell whether motion that has met a surface goes through it, and does not only touch it.
+
+    Over the shortest flight the rate of a crossing hardly changes. A touch is found to the root of rounding:
+    its rate is a tenth of that flight's change at most.
+    """
+    if tables.flights[mode] >= 0:
+        return False
+    c, none, empty = tables.observables[surface], workspace.none, workspace.empty
+    here, h = functions.rate(mode, c, t, y, p, none, empty), NO_FLIGHT * unit
+    functions.flow(mode, t, y, h, p, none, workspace.trial, workspace.nothing)
+    later = functions.rate(mode, c, t + h, workspace.trial, p, none, empty)
+    return abs(later - here) < 0.1 * abs(here)
+
+
+@helper
 def in_flight(functions, tables, mode, wall, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Tell whether a state in a mode of chatter is between impacts still, and not at rest on the wall."""
     c, none, empty, size = tables.observables[wall], workspace.none, workspace.empty, 1.0
@@ -55,3 +71,13 @@ def lying_on(functions, tables, t, y, p, workspace):  # type: ignore[no-untyped-
         if abs(value - level) <= NO_TIME * (1.0 + abs(level)):
             found |= 1 << k
     return found
+
+
+@helper
+def walls_of(tables):  # type: ignore[no-untyped-def]
+    """Return 1 if a model has resets, in any of its modes."""
+    for mode in range(tables.bounds.shape[0]):
+        for k in range(tables.bounds.shape[1]):
+            if tables.bounds[mode, k] == 2:
+                return 1
+    return 0

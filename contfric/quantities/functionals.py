@@ -144,9 +144,9 @@ class Measuring:
         laws = self.inside.powers(contact)
         size = max(least_size(self.motion.pieces, function) for function in laws)
         total = self._integral(asked, self.inside.power(contact), size)
-        loss, itinerary = self.inside.loss(contact), self.motion.orbit.itinerary
-        for segment, (_, exit_) in zip(self.motion.segments, itinerary, strict=True):
-            if exit_ == contact and exit_ in self.motion.orbit.model.reset_by_surface:
+        loss, orbit = self.inside.loss(contact), self.motion.orbit
+        for segment, joint in zip(self.motion.segments, orbit.itinerary, strict=True):
+            if joint[1] == contact and orbit.model.reset_at(*joint) is not None:
                 lost = loss(segment, np.ones(1), Kinks())
                 slopes = lost.slopes[0, : self.motion.count]
                 total = _dual(total + self.number(float(lost.values[0]), slopes))

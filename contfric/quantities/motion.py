@@ -323,8 +323,8 @@ class Motion:
     def _d_begin(self, i: int) -> FloatArray:
         """Return how the start of a segment moves: that of its joint, mapped by the reset there."""
         orbit, moved = self.orbit, self.d_cycle[i]
-        entry = orbit.itinerary[i - 1][1]
-        if entry not in orbit.model.reset_by_surface or not self.count:
+        before, entry = orbit.itinerary[i - 1]
+        if orbit.model.reset_at(before, entry) is None or not self.count:
             return np.asarray(moved[1:])
         n, every = len(moved) - 1, np.arange(len(orbit.vector))
         k, joint = orbit.model.surface_index[entry], np.ascontiguousarray(orbit.cycle[i])

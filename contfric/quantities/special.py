@@ -41,10 +41,11 @@ def impact_velocity(measuring: Measuring) -> Dual:
 
     The speed is the rate of the surface's observable before its reset.
     """
-    orbit, resets = measuring.motion.orbit, measuring.motion.orbit.model.reset_by_surface
+    orbit = measuring.motion.orbit
     met: list[tuple[int, float, FloatArray]] = []
-    for i, (_, exit_) in enumerate(orbit.itinerary):
-        if exit_ in resets and resets[exit_].stays and not resets[exit_].wraps:
+    for i, joint in enumerate(orbit.itinerary):
+        reset = orbit.model.reset_at(*joint)
+        if reset is not None and reset.stays and not reset.wraps:
             rate, grad = _rate_at_end(orbit, i)
             met.append((i, abs(rate), np.sign(rate) * grad))
     if not met:

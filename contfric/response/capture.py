@@ -18,6 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.sides import surfaces_after
 from contfric.orbit.trajectory import TablesType
+from contfric.orbit.walls import walls_of
 from contfric.response.targets import Targets
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)
@@ -74,12 +75,10 @@ def capture(  # type: ignore[no-untyped-def]
     n, surfaces = states.shape[1], tables.observables.shape[0]
     walk, workspace = new_walk(n), state_workspace(n)
     period = functions.period(p, workspace.none, workspace.empty)
-    timeless, walls = period <= 0.0, 0
+    timeless = period <= 0.0
     if timeless:
         period = 1.0
-    for k in range(surfaces):
-        walls = 1 if tables.bounds[0, k] == 2 else walls
-    walk.at_once[1] = 2 * walls + (1 if timeless else 0)
+    walk.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
     phase = time if timeless else time - math.floor(time / period) * period
     for cell in range(states.shape[0]):
         if stop[0] != 0:

@@ -173,7 +173,7 @@ def release_of(model: Model, surface: str | None) -> tuple[_Release, str]:
     domain, target = (model.domain_by_name[name] for name in ways[surface])
     rests = next((n for n, sign in domain.signs.items() if sign == 0), surface)
     mode, k, found = model.mode_index[domain.mode], model.surface_index[surface], tables(model)
-    on = int(found.landed[k] | (found.lies_on[mode] & found.kept[k]))
+    on = int(found.landed[mode, k] | (found.lies_on[mode] & found.kept[mode, k]))
     return _Release(mode, k, model.mode_index[target.mode], on), rests
 
 

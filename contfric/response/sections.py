@@ -10,7 +10,7 @@ import numpy as np
 from contfric.errors import ParameterError, did_you_mean, real_number, shown
 from contfric.models.definition import Model
 from contfric.orbit.system import IntArray
-from contfric.orbit.tables import tables
+from contfric.orbit.tables import MAPPED, tables
 from contfric.response.cuts import Cut
 
 #: "stops", "releases", the name of a surface (or kink), or a phase as a share of the period.
@@ -86,9 +86,8 @@ def _on_surface(model: Model, section: str, sense: int) -> Cut:
             )
         return Cut(joints, inside, 0, -1, -1.0, 0)
     name = model.stop_surface if section == STOPS else section
-    if section == STOPS:
-        for reset in model.reset_by_surface:
-            joints[:, model.surface_index[reset]] = 1
+    if section == STOPS and model.resets:
+        joints[tables(model).bounds == MAPPED] = 1
     if name in surfaces:
         k = model.surface_index[name]
         joints[:, k] = 1

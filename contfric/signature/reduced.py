@@ -127,7 +127,7 @@ def mirror_itinerary(itinerary: ReducedItinerary, model: Model) -> ReducedItiner
 def fuses(model: Model, mode: str, surface: str, next_mode: str) -> bool:
     """Return whether the field is the same on both sides of a joint."""
     same = model.whole_mode(mode) == model.whole_mode(next_mode)
-    return same and surface not in model.reset_by_surface
+    return same and model.reset_at(mode, surface) is None
 
 
 def section_ends(model: Model, pairs: Sequence[ReducedPair]) -> list[int]:

@@ -63,27 +63,50 @@ def test_the_simplest_walker(tmp_path) -> None:
     assert doubling[0].params["gamma"] == pytest.approx(0.0151, abs=5e-5)
 
 
-@pytest.mark.parametrize("lead", ["", ", to: stance"])
-def test_a_reset_does_not_map_what_ends_at_its_surface_in_another_mode(tmp_path, lead: str) -> None:
-    """It mapped that too; now solutions end there, and check says why."""
-    modes = "{stance: {in: {heel: +}}, late: {in: {heel: -}}}"
+@pytest.mark.parametrize("lead", ["", "to: stance"])
+def test_motion_that_a_reset_does_not_map_passes(tmp_path, lead: str) -> None:
+    """The legs pass each other where phi = 2 theta, too: in 'stance' the heel goes on below the ground.
+
+    Its gait is that of the walker with a surface of its own for the passing.
+    """
     text = WALKER.replace(", pass: {observable: phi}", "")
-    text = text.replace(
-        "modes:\n  early: {in: {pass: +}}\n  late: {in: {pass: -, heel: -}}", f"modes: {modes}"
-    )
-    text = text.replace(
-        "theta: -theta\n", f"theta: -theta\n    from: [late]\n{lead.replace(', ', '    ')}\n"
-    )
+    text = text.replace("early: {in: {pass: +}}", "stance: {in: {heel: +}}")
+    text = text.replace("{pass: -, heel: -}", "{heel: -}")
+    text = text.replace("theta: -theta\n", f"theta: -theta\n    from: late\n    {lead}\n")
     if not lead:
         with pytest.raises(cf.ModelError, match="or the mode to which it leads"):
             typed(tmp_path, text)
         return
     model = typed(tmp_path, text)
-    assert "motion in 'stance' meets 'heel'" in str(cf.check_model(model))
-    with pytest.raises(cf.ConvergenceError, match="`contfric check` says"):
-        cf.find_orbit(model, state=[0.2003109, 0.4007, -0.1998325, -0.0158])
-    late = cf.simulate(model, state=[-0.17, -0.39, -0.19, -0.02], domain="late", periods=1.5)
-    assert [event[:2] for event in late.itinerary] == [("late", "heel")]
+    assert model.targets == {("stance", "heel"): ("late",), ("late", "heel"): ("stance",)}
+    assert cf.check_model(model).ok
+    orbit = cf.find_orbit(model, state=[0.2, 0.4, -0.2, -0.0158])
+    assert str(orbit.signature) == "late -> impact@heel -> stance"
+    strike = orbit.ends[[exit_ for _, exit_ in orbit.itinerary].index("heel")]
+    assert abs(strike[1]) == pytest.approx(0.200310900544287, abs=1e-11)
+    assert orbit.multipliers[0] == pytest.approx(-0.1900998 + 0.5575988j, abs=1e-6)
+
+
+def test_what_a_reset_does_not_map_ends_where_nothing_is_behind(tmp_path) -> None:
+    """Below 'low' the heater is off, whatever turned it off: what a reset does not map has nowhere to go."""
+    text = """
+name: fuse
+states: [x, y]
+parameters: {b: 0.5}
+autonomous: true
+surfaces: {top: {observable: x, level: 1}, bottom: {observable: x, level: -1}}
+modes:
+  up: {in: {top: -}, field: {x: 1 + 0*y, y: -y}}
+  down: {in: {top: -, bottom: +}, field: {x: b - 2 + 0*y, y: -y}}
+  late: {in: {top: -, bottom: +}, field: {x: 2 + 0*y, y: -y}}
+resets:
+  top: {y: y + 1, from: up, to: down}
+  bottom: {to: late}
+"""
+    model = typed(tmp_path, text)
+    assert "motion in 'late' meets 'top'" in str(cf.check_model(model))
+    ends = cf.simulate(model, state=[0, 0], domain="late", periods=9)
+    assert ends.end.name == "IMPOSSIBLE" and not ends.itinerary
 
 
 #: A phase detector with three states, named by two resets that divide them all.

@@ -1,4 +1,4 @@
-"""Modes that end at a surface with a reset that acts in other modes only."""
+"""Modes that end at a surface with a reset that acts in other modes only, where no mode is behind it."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ _STILL = 1e-9
 
 
 def check_passages(report: ModelReport, probe: Probe) -> None:
-    """Warn of modes that end at a surface whose reset acts in other modes only: nothing follows there."""
+    """Warn of modes that end at a surface whose reset acts in other modes only, with nothing behind it."""
     for surface in probe.model.reset_by_surface:
         if mode := _ending(probe, surface):
             acts = " or ".join(probe.model.reset_by_surface[surface].modes)
             report.warn(
                 Topic.RESETS,
                 f"motion in '{mode}' meets '{surface}', where its mode ends, and the reset there acts in "
-                f"{acts} only: solutions end there. A surface with a reset is passed unchanged in modes "
-                f"that say no side of it: leave '{surface}' out of the 'in' of '{mode}', which then ends at "
-                "another surface",
+                f"{acts} only: motion passes it unchanged, and no mode is behind it. Add one, or "
+                f"leave '{surface}' out of the 'in' of '{mode}', which then ends at another surface",
             )
 
 

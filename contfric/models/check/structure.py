@@ -49,7 +49,7 @@ def check_transitions(report: ModelReport, probe: Probe) -> None:
     """Check that every crossing that motion makes has a next domain."""
     model = probe.model
     for surface in model.surfaces:
-        if surface.name not in {*model.reset_by_surface, *model.settled_sides}:
+        if surface.name not in model.settled_sides:
             _check_crossings(report, probe, surface)
 
 
@@ -137,6 +137,8 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
             side, name = domain.signs[surface.name], domain.name
             if not side or domain.signs != {**signs, surface.name: side}:
                 continue
+            if model.maps_at(domain, surface.name) or model.ends_at(domain, surface.name):
+                continue  # what its reset does is another matter, and so is that nothing follows it
             rate = probe.rate(domain.own_mode, surface.name, t, y)
             if not side * rate < -_STILL:
                 continue
@@ -183,6 +185,8 @@ def _goes_on(
     domain = probe.model.domain_by_name[following]
     side = domain.signs[surface.name]
     back = probe.model.transitions.get((following, surface.name))
+    if probe.model.maps_at(domain, surface.name):
+        return True  # it is mapped at once
     if side == 0 or (back and probe.model.domain_by_name[back].own_mode == domain.own_mode):
         return True  # it stays, or the surface ends the other mode only
     rate = probe.rate(domain.own_mode, surface.name, t, y)
@@ -235,22 +239,36 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     signs = probe.signs(t, behind)
     where = f"after the reset at '{name}' the solution from {_place(probe, t, y)}"
     possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
+    passes = _other_side(model, reset, before)
     fits = [
         d
         for d in possible
         if all(d.signs[s] == v for s, v in signs.items() if s not in reset.lands)
     ]
     if not fits:
-        return f"{where} is in no domain: {_sides(signs)}. Add a mode that holds there"
+        return f"{where} is in no domain: {_sides(signs)}. Add a mode that holds there{passes}"
     for surface in reset.lands:
         rate = probe.rate(fits[0].own_mode, surface, t, behind)
         if not fits[0].signs[surface] * rate > 0.0:
             observable = model.surface_by_name[surface].observable
             return (
                 f"{where} still runs into the surface '{surface}': a reset must turn the rate of "
-                f"'{observable}' around, such as v: -e*v, or lead off the surface"
+                f"'{observable}' around, such as v: -e*v, or lead off the surface{passes}"
             )
     return ""
+
+
+def _other_side(model: Model, reset: Reset, before: Domain) -> str:
+    """Return how to say that a reset does not act in a mode, where it acts on the other side too."""
+    side = before.signs[reset.surface]
+    acting = [d for d in model.domains if model.maps_at(d, reset.surface)]
+    others = dict.fromkeys(d.own_mode for d in acting if d.signs[reset.surface] == -side)
+    if not others or before.own_mode in others:
+        return ""
+    return (
+        f"; or, if motion passes '{reset.surface}' unchanged in '{before.own_mode}', write "
+        f"'from: [{', '.join(others)}]' to the reset"
+    )
 
 
 def check_sliding(report: ModelReport, probe: Probe) -> None:
