@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,8 @@ from contfric.errors import ParameterError, function_of, real_number, shown, who
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
+from contfric.remember.folder import kept_in
+from contfric.remember.journal import remembered
 from contfric.response.section_map import NEAR, SectionMap
 
 if TYPE_CHECKING:
@@ -43,8 +46,8 @@ _SHORTEST = 1e-3
 #: Beyond a break the set is looked for at so many distances, up to this share of the ranges, and at these
 #: angles (rad). A gap is as wide as the map makes it, whatever the step is.
 _GAPS, _REACH, _FAN = 9, 0.02, np.linspace(-1.0, 1.0, 21)
-#: Points between two lines of progress.
-_TOLD = 50
+#: Points of a stretch: of it progress is told, and it is kept.
+_STRETCH = 50
 
 
 class StableEnd(str, Enum):
@@ -128,6 +131,7 @@ def stable_set(
     phase: float = 0.0,
     max_step: float | None = None,
     max_points: int = 2000,
+    folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> StableSet:
     """Follow the stable set of an unstable orbit in the plane of the two states.
@@ -145,6 +149,8 @@ def stable_set(
         Longest step along the set; by default a hundredth of the ranges.
     max_points : int
         Most points of each half.
+    folder : path, optional
+        Where finished stretches are kept; the same call goes on from them.
     progress : callable, optional
         Called with one line of text now and then.
 
@@ -152,6 +158,8 @@ def stable_set(
     ------
     ParameterError
         If the orbit is no saddle of that kind, or an argument is not valid.
+    ResultFileError
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -173,11 +181,18 @@ def stable_set(
     )
     whole_number("max_points", max_points, least=2)
     halves, ends, breaks = [], [], []
-    for sign in (1.0, -1.0):
-        half = _Half(section, [section.saddle], sign * section.stable, low, high, progress)
-        ends.append(half.trace(min(_FIRST * section.size, longest), longest, max_points))
-        halves.append(np.array(half.points))
-        breaks.append(np.array(half.breaks, dtype=np.int64))
+    with kept_in(folder):
+        for sign in (1.0, -1.0):
+            half = _Half(section, [section.saddle], sign * section.stable, low, high)
+            first = min(_FIRST * section.size, longest)
+            stopped = StableEnd.INTERRUPTED in ends
+            ends.append(
+                StableEnd.INTERRUPTED
+                if stopped
+                else half.trace(first, longest, max_points, progress)
+            )
+            halves.append(np.array(half.points))
+            breaks.append(np.array(half.breaks, dtype=np.int64))
     return StableSet(
         orbit, section.phase, (halves[0], halves[1]), (breaks[0], breaks[1]), (ends[0], ends[1])
     )
@@ -225,6 +240,45 @@ def check_ranges(model: Model, ranges: object) -> tuple[FloatArray, FloatArray]:
     return found[:, 0], found[:, 1]
 
 
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """A stretch of a half: its points, those of them that a break leads to, and from where it goes on.
+
+    Attributes
+    ----------
+    end : why the half ends there, None if it goes on
+    """
+
+    points: FloatArray
+    breaks: list[int]
+    direction: FloatArray
+    step: float
+    end: StableEnd | None
+
+
+@remembered(without=("section",), finished=lambda s: s.end is not StableEnd.INTERRUPTED)
+def _stretch(
+    orbit: Orbit,
+    phase: float,
+    corners: tuple[FloatArray, FloatArray],
+    last: FloatArray,
+    direction: FloatArray,
+    steps: tuple[float, float],
+    most: int,
+    section: SectionMap,
+) -> _Stretch:
+    """Follow a half by so many points.
+
+    Parameters
+    ----------
+    steps : the next step, and the longest
+    section : the section map of the orbit at the phase
+    """
+    half = _Half(section, [last], direction, *corners)
+    step, end = half.grow(*steps, most)
+    return _Stretch(np.array(half.points[1:]), half.breaks, half.direction, step, end)
+
+
 @dataclass
 class _Half:
     """One half of a stable set while it grows."""
@@ -234,13 +288,40 @@ class _Half:
     direction: FloatArray
     low: FloatArray
     high: FloatArray
-    progress: Progress | None
     breaks: list[int] = field(default_factory=list)
 
-    def trace(self, step: float, longest: float, most: int) -> StableEnd:
-        """Follow it to its end."""
+    def trace(self, step: float, longest: float, most: int, progress: Progress | None) -> StableEnd:
+        """Follow it to its end, stretch by stretch."""
         try:
             while len(self.points) < most:
+                step, end = self._add_stretch(step, longest, most)
+                if progress is not None:
+                    where = ", ".join(f"{value:.6g}" for value in self.points[-1])
+                    progress(f"{len(self.points)} points of a half, at ({where})")
+                if end is not None:
+                    return end
+        except KeyboardInterrupt:
+            return StableEnd.INTERRUPTED
+        return StableEnd.POINTS
+
+    def _add_stretch(
+        self, step: float, longest: float, most: int
+    ) -> tuple[float, StableEnd | None]:
+        """Return the next step, and why it ends if it does."""
+        count, corners = len(self.points), (self.low, self.high)
+        found = _stretch(
+            *(self.section.orbit, self.section.phase, corners, self.points[-1], self.direction),
+            *((step, longest), min(_STRETCH, most - count), self.section),
+        )
+        self.breaks += [count - 1 + k for k in found.breaks]
+        self.points += list(found.points)
+        self.direction = found.direction
+        return found.step, found.end
+
+    def grow(self, step: float, longest: float, most: int) -> tuple[float, StableEnd | None]:
+        """Add so many points; return the next step, and why it ends if it does."""
+        try:
+            while len(self.points) <= most:
                 found = self._next(step)
                 if found is None:
                     if step > _SHORTEST * longest:
@@ -248,25 +329,18 @@ class _Half:
                         continue
                     found = self._beyond_break(longest)
                     if found is None:
-                        return StableEnd.BREAK
+                        return step, StableEnd.BREAK
                     self._go_on_beyond(found, step)
                     continue
                 turn = self._turn(found)
                 self.direction = (found - self.points[-1]) / np.hypot(*(found - self.points[-1]))
                 self.points.append(found)
-                self._say()
                 if np.any(found < self.low) or np.any(found > self.high):
-                    return StableEnd.RANGE
+                    return step, StableEnd.RANGE
                 step = min(longest, step * (2.0 if turn < 0.5 * _TURN else 1.0))
         except KeyboardInterrupt:
-            return StableEnd.INTERRUPTED
-        return StableEnd.POINTS
-
-    def _say(self) -> None:
-        count = len(self.points)
-        if self.progress is not None and count % _TOLD == 0:
-            where = ", ".join(f"{value:.6g}" for value in self.points[-1])
-            self.progress(f"{count} points of a half, at ({where})")
+            return step, StableEnd.INTERRUPTED
+        return step, None
 
     def _turn(self, found: FloatArray) -> float:
         chord = found - self.points[-1]
