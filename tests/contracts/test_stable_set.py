@@ -81,7 +81,7 @@ def test_it_goes_on_from_its_folder(
         again = cf.stable_set(saddle, RANGES, max_step=0.08, folder=tmp_path)
         assert again.points.tobytes() == edge.points.tobytes() and again.ends == edge.ends
         assert [b.tolist() for b in again.breaks] == [b.tolist() for b in edge.breaks]
-        monkeypatch.setattr("contfric.response.stable_set._Half.grow", None)  # not to be called
+        monkeypatch.setattr("contfric.response.stable_half.Half.grow", None)  # not to be called
 
 
 def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
