@@ -7,6 +7,7 @@ signatures may change on the way. It depends on nothing else: any process can so
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
@@ -22,6 +23,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
+from contfric.remember.journal import remembered
 
 Datum: TypeAlias = Measured | Series | Jump
 Near: TypeAlias = Orbit | Bifurcation | None
@@ -122,6 +124,47 @@ def attempt(condition: Condition, params: Mapping[str, float], near: Near) -> An
     try:
         return condition.answer(params, near)
     except ContfricError:
+        return None
+
+
+@remembered(without=("executor",))
+def answers_of(
+    conditions: tuple[Condition, ...],
+    params: Mapping[str, float],
+    near: tuple[Near, ...],
+    executor: Executor | None,
+) -> list[Answer]:
+    """Return what the conditions say at some parameters; what an executor does not solve is solved here.
+
+    Raises
+    ------
+    ContfricError
+        If one of them has no orbit.
+    """
+    pairs = list(zip(conditions, near, strict=True))
+    asked = [_submitted(executor, condition, params, last) for condition, last in pairs]
+    return [
+        _result(future) or condition.answer(params, last)
+        for (condition, last), future in zip(pairs, asked, strict=True)
+    ]
+
+
+def _submitted(
+    executor: Executor | None, condition: Condition, params: Mapping[str, float], near: Near
+) -> Future[Answer | None] | None:
+    if executor is None:
+        return None
+    try:
+        return executor.submit(attempt, condition, dict(params), near)
+    except RuntimeError:  # it was shut down, or is broken
+        return None
+
+
+def _result(future: Future[Answer | None] | None) -> Answer | None:
+    """Return what a worker has found; None if that is nothing, or was lost with its worker."""
+    try:
+        return None if future is None else future.result()
+    except Exception:  # executors of others raise errors of their own
         return None
 
 

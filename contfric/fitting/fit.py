@@ -9,7 +9,8 @@ J)^{-1}`, to first order, for independent errors of the given standard deviation
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from contfric.errors import (
     items_of,
     shown,
 )
-from contfric.fitting.condition import Answer, Condition, Datum, Near, attempt, conditions_of
+from contfric.fitting.condition import Answer, Datum, Near, answers_of, conditions_of
 from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import signal_of
 from contfric.fitting.result import INTERRUPTED, Fit
@@ -32,6 +33,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity
+from contfric.remember.folder import kept_in
 
 #: Residual, in standard deviations, of a trial without an orbit: so far off that the step is taken back.
 _NO_ORBIT = 1e6
@@ -49,6 +51,7 @@ def fit(
     free: Sequence[str],
     *,
     executor: Executor | None = None,
+    folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Find the parameters at which a model's periodic orbits agree best with measurements.
@@ -68,6 +71,8 @@ def fit(
     executor : any :class:`concurrent.futures.Executor`, optional
         Solves conditions side by side. It helps where orbits are expensive: those of the closed form take
         less time than their way to another process.
+    folder : path, optional
+        Where finished trials are kept; the same call goes on from them.
     progress : callable, optional
         Called with one line of text for each trial.
 
@@ -77,6 +82,8 @@ def fit(
         If the data, the parameters or the free ones are not valid.
     ConvergenceError
         If there is no periodic orbit at the start, or the data do not determine the free parameters.
+    ResultFileError
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -91,8 +98,9 @@ def fit(
     function_of("progress", progress)
     names, start = check_fit(model, data, params, free)
     problem = _Problem(model, tuple(data), dict(params), names, executor, progress)
-    problem.solve(start)  # an error here is the user's to see
-    success, message = problem.search(start)
+    with kept_in(folder):
+        problem.solve(start)  # an error here is the user's to see
+        success, message = problem.search(start)
     best = problem.best
     assert best is not None
     covariance = _covariance(best.jacobian)
@@ -278,7 +286,7 @@ class _Problem:
             If one of them has no orbit.
         """
         parts: dict[int, tuple[FloatArray, FloatArray, Orbit]] = {}
-        for k, answer in enumerate(self._answers({**self.params, **self.values(x)})):
+        for k, answer in enumerate(self._answers(x)):
             self.near[k] = answer.near
             numbers = self.conditions[k][1]
             for number, *part in zip(numbers, answer.residuals, answer.slopes, strict=True):
@@ -290,29 +298,7 @@ class _Problem:
             self.best = trial
         return trial
 
-    def _answers(self, params: Mapping[str, float]) -> list[Answer]:
-        """Return what the conditions say; what an executor does not solve is solved here."""
-        pairs = [(c, near) for (c, _), near in zip(self.conditions, self.near, strict=True)]
-        asked = [self._submitted(condition, params, near) for condition, near in pairs]
-        return [
-            _result(future) or condition.answer(params, near)
-            for (condition, near), future in zip(pairs, asked, strict=True)
-        ]
-
-    def _submitted(
-        self, condition: Condition, params: Mapping[str, float], near: Near
-    ) -> Future[Answer | None] | None:
-        if self._executor is None:
-            return None
-        try:
-            return self._executor.submit(attempt, condition, dict(params), near)
-        except RuntimeError:  # it was shut down, or is broken
-            return None
-
-
-def _result(future: Future[Answer | None] | None) -> Answer | None:
-    """Return what a worker has found; None if that is nothing, or was lost with its worker."""
-    try:
-        return None if future is None else future.result()
-    except Exception:  # executors of others raise errors of their own
-        return None
+    def _answers(self, x: FloatArray) -> list[Answer]:
+        conditions = tuple(condition for condition, _ in self.conditions)
+        params = {**self.params, **self.values(x)}
+        return answers_of(conditions, params, tuple(self.near), self._executor)

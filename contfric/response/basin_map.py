@@ -257,15 +257,33 @@ def _find_by_seeds(job: _Job, attractors: Attractors) -> None:
     count = len(job.states)
     spread = np.floor(np.mod(_GOLDEN * np.arange(1, _SEEDS + 1), 1.0) * count).astype(np.int64)
     chosen = np.unique(spread)
-    left = chosen
+    left, tries = chosen, 1
     while len(left):
         if attractors.orbits:
             began = monotonic()
             rows = compute_basin_tile(job.tile(attractors, left))
             job.foretell(len(left), monotonic() - began)
             left = left[_unknown(rows)]
-        while len(left) and not attractors.search(job.states[left[0]], job.time):
-            left = left[1:]
+        left, tries = _search(job, attractors, left, tries)[0], 2 * tries
+
+
+def _search(job: _Job, attractors: Attractors, left: IntArray, tries: int) -> tuple[IntArray, bool]:
+    """Look for the orbits of the first of some starts, until there is a new one.
+
+    To follow what no orbit catches takes long. Where every start has an orbit of its own, as on a continuum,
+    each new one catches nothing else: so twice as many are looked for each time before what is left is
+    followed again.
+
+    Returns
+    -------
+    The starts that may be caught now; and whether there is a new orbit.
+    """
+    while len(left):
+        found = [attractors.search(job.states[start], job.time) for start in left[:tries]]
+        if any(found):
+            return left[found.index(True) :], True
+        left = left[tries:]
+    return left, False
 
 
 def _label(
@@ -288,10 +306,10 @@ def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:
 
 def _resolve(job: _Job, attractors: Attractors, rows: BasinRows) -> None:
     """Find the orbits of what is periodic and unknown, until nothing is left that has one."""
-    left = _unknown(rows)
+    left, tries = _unknown(rows), 1
     while len(left):
-        if attractors.search(job.states[left[0]], job.time):
+        left, new = _search(job, attractors, left, tries)
+        if new:
             _label(job, attractors, left, rows, None)
             left = np.intersect1d(left, _unknown(rows))
-        else:  # its orbit cannot be told: it stays periodic, without a number
-            left = left[1:]
+        tries *= 2

@@ -15,9 +15,8 @@ for on the other side, and ends where it is not found within a fiftieth of the r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import Enum
-from itertools import pairwise
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,34 +27,15 @@ from contfric.errors import ParameterError, function_of, real_number, shown, who
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
-from contfric.response.section_map import NEAR, SectionMap
+from contfric.remember.folder import kept_in
+from contfric.response.section_map import SectionMap
+from contfric.response.stable_half import Half, StableEnd
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 #: First distance from the saddle, in sizes of the orbit: its set is straight there to its square.
 _FIRST = 1e-3
-#: Halves of the arc on which the next point is looked for (rad), and the turn that is accepted. Starts at the
-#: ends of a narrow arc come to the saddle from farther away.
-_ARCS, _TURN = (0.04, 0.12, 0.4), 0.3
-#: Shortest step, as a share of the longest: what is lost on it is a break.
-_SHORTEST = 1e-3
-#: Beyond a break the set is looked for at so many distances, up to this share of the ranges, and at these
-#: angles (rad). A gap is as wide as the map makes it, whatever the step is.
-_GAPS, _REACH, _FAN = 9, 0.02, np.linspace(-1.0, 1.0, 21)
-#: Points between two lines of progress.
-_TOLD = 50
-
-
-class StableEnd(str, Enum):
-    """Why a stable set ends."""
-
-    RANGE = "end of the range asked for"
-    BREAK = (
-        "the section map jumps: solutions on one side stop, or touch a surface, where others do not"
-    )
-    POINTS = "the largest number of points was reached"
-    INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +108,7 @@ def stable_set(
     phase: float = 0.0,
     max_step: float | None = None,
     max_points: int = 2000,
+    folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> StableSet:
     """Follow the stable set of an unstable orbit in the plane of the two states.
@@ -145,6 +126,8 @@ def stable_set(
         Longest step along the set; by default a hundredth of the ranges.
     max_points : int
         Most points of each half.
+    folder : path, optional
+        Where finished stretches are kept; the same call goes on from them.
     progress : callable, optional
         Called with one line of text now and then.
 
@@ -152,6 +135,8 @@ def stable_set(
     ------
     ParameterError
         If the orbit is no saddle of that kind, or an argument is not valid.
+    ResultFileError
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -173,11 +158,18 @@ def stable_set(
     )
     whole_number("max_points", max_points, least=2)
     halves, ends, breaks = [], [], []
-    for sign in (1.0, -1.0):
-        half = _Half(section, [section.saddle], sign * section.stable, low, high, progress)
-        ends.append(half.trace(min(_FIRST * section.size, longest), longest, max_points))
-        halves.append(np.array(half.points))
-        breaks.append(np.array(half.breaks, dtype=np.int64))
+    with kept_in(folder):
+        for sign in (1.0, -1.0):
+            half = Half(section, [section.saddle], sign * section.stable, low, high)
+            first = min(_FIRST * section.size, longest)
+            stopped = StableEnd.INTERRUPTED in ends
+            ends.append(
+                StableEnd.INTERRUPTED
+                if stopped
+                else half.trace(first, longest, max_points, progress)
+            )
+            halves.append(np.array(half.points))
+            breaks.append(np.array(half.breaks, dtype=np.int64))
     return StableSet(
         orbit, section.phase, (halves[0], halves[1]), (breaks[0], breaks[1]), (ends[0], ends[1])
     )
@@ -223,104 +215,3 @@ def check_ranges(model: Model, ranges: object) -> tuple[FloatArray, FloatArray]:
     ):
         raise ParameterError(f"{wanted}, got {shown(ranges)}")
     return found[:, 0], found[:, 1]
-
-
-@dataclass
-class _Half:
-    """One half of a stable set while it grows."""
-
-    section: SectionMap
-    points: list[FloatArray]
-    direction: FloatArray
-    low: FloatArray
-    high: FloatArray
-    progress: Progress | None
-    breaks: list[int] = field(default_factory=list)
-
-    def trace(self, step: float, longest: float, most: int) -> StableEnd:
-        """Follow it to its end."""
-        try:
-            while len(self.points) < most:
-                found = self._next(step)
-                if found is None:
-                    if step > _SHORTEST * longest:
-                        step *= 0.5
-                        continue
-                    found = self._beyond_break(longest)
-                    if found is None:
-                        return StableEnd.BREAK
-                    self._go_on_beyond(found, step)
-                    continue
-                turn = self._turn(found)
-                self.direction = (found - self.points[-1]) / np.hypot(*(found - self.points[-1]))
-                self.points.append(found)
-                self._say()
-                if np.any(found < self.low) or np.any(found > self.high):
-                    return StableEnd.RANGE
-                step = min(longest, step * (2.0 if turn < 0.5 * _TURN else 1.0))
-        except KeyboardInterrupt:
-            return StableEnd.INTERRUPTED
-        return StableEnd.POINTS
-
-    def _say(self) -> None:
-        count = len(self.points)
-        if self.progress is not None and count % _TOLD == 0:
-            where = ", ".join(f"{value:.6g}" for value in self.points[-1])
-            self.progress(f"{count} points of a half, at ({where})")
-
-    def _turn(self, found: FloatArray) -> float:
-        chord = found - self.points[-1]
-        cosine = float(chord @ self.direction) / (np.hypot(*chord) * np.hypot(*self.direction))
-        return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-
-    def _next(self, step: float) -> FloatArray | None:
-        """Return the point of the set on an arc; None without one, or where it turns too much."""
-        for arc in _ARCS:
-            angle = self._angle(step, -arc, arc)
-            if angle is not None:
-                return self._point(step, angle) if abs(angle) < _TURN else None
-        return None
-
-    def _beyond_break(self, longest: float) -> FloatArray | None:
-        """Return the nearest point of the set across a break; None without one within reach."""
-        reach = max(longest, _REACH * float(np.hypot(*(self.high - self.low))))
-        for step in np.geomspace(_SHORTEST * longest, reach, _GAPS):
-            for one, other in pairwise(_FAN):
-                angle = self._angle(float(step), float(one), float(other))
-                if angle is not None:
-                    return self._point(float(step), angle)
-        return None
-
-    def _go_on_beyond(self, found: FloatArray, step: float) -> None:
-        """Take a point beyond a break, and the direction of the set there: the one that leads away."""
-        self.direction = found - self.points[-1]
-        self.breaks.append(len(self.points))
-        self.points.append(found)
-        for one, other in sorted(pairwise(2.0 * _FAN), key=lambda pair: abs(sum(pair))):
-            angle = self._angle(step, one, other)
-            if angle is not None:
-                self.direction = self._point(step, angle) - found
-                return
-
-    def _point(self, step: float, angle: float) -> FloatArray:
-        ahead = np.arctan2(self.direction[1], self.direction[0]) + angle
-        return np.asarray(self.points[-1] + step * np.array([np.cos(ahead), np.sin(ahead)]))
-
-    def _angle(self, step: float, low: float, high: float) -> float | None:
-        """Return the angle between two at which u vanishes on an arc; None if it does not, or jumps."""
-        from scipy.optimize import brentq
-
-        def departure_at(angle: float) -> float:
-            found = self.section.departure(self._point(step, angle))
-            if found is None:
-                raise ArithmeticError
-            return found
-
-        try:
-            if not departure_at(low) * departure_at(high) < 0.0:
-                return None
-            angle = float(brentq(departure_at, low, high, xtol=1e-12, rtol=1e-12))
-            jump = abs(departure_at(angle)) > 1e-3 * NEAR * self.section.size
-        except ArithmeticError:
-            return None
-        return None if jump else angle

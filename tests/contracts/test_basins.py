@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 
 import contfric as cf
 from contfric.response import basin_map, targets
+from contfric.response.basin_tile import BasinRows
 from contfric.study.result import RunStatus
 
 #: Two images of an asymmetric orbit, and a symmetric one, coexist.
@@ -122,6 +124,31 @@ def test_no_start_is_followed_before_an_orbit_is_known(monkeypatch: pytest.Monke
     assert any(
         re.search(r"\d+ starts took .*, all \d+ take about .* of one processor", t) for t in said
     )
+
+
+def test_starts_with_orbits_of_their_own_are_not_followed_again_for_each(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a continuum a new orbit catches its own start only: passes grow with the logarithm of the starts."""
+    orbits: list[int] = [-1]
+    followed: list[int] = []
+
+    def search(state: int, time: float) -> bool:
+        orbits.append(state)
+        return orbits.count(state) == 1
+
+    def caught(left: Any) -> Any:
+        followed.append(len(left))
+        labels = np.array([0 if start in orbits else -1 for start in left], dtype=np.int32)
+        return BasinRows(labels, np.full(len(left), cf.Motion.PERIODIC.code, dtype=np.uint8))
+
+    job: Any = SimpleNamespace(
+        states=range(500), time=0.0, tile=lambda _, left: left, foretell=lambda *_: None
+    )
+    monkeypatch.setattr(basin_map, "compute_basin_tile", caught)
+    basin_map._find_by_seeds(job, SimpleNamespace(orbits=orbits, search=search))  # type: ignore[arg-type]
+    assert len(orbits) == 65 == len(set(orbits))  # each of the 64 seeds was looked for once
+    assert followed == [64, 64, 63, 61, 57, 49, 33, 1]
 
 
 def test_escaping_starts_are_named() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from contextlib import suppress
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.fitting.condition import Condition
 from contfric.study.read import read_study
 
 TRUE = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -134,6 +136,46 @@ def test_interrupted_keeps_the_best_trial(data: list[Any], found: cf.Fit) -> Non
 
 
 # ------------------------------------------------------------------------------------------- studies
+
+
+@pytest.mark.parametrize("calls", [2, 7, 16])
+def test_a_fit_goes_on_from_its_folder(
+    data: list[Any], found: cf.Fit, tmp_path: Path, monkeypatch, calls: int
+) -> None:
+    """Stopped at any call, it comes to the same bits, and what was finished is not solved again."""
+    solved: list[Any] = []
+    answer = Condition.answer
+
+    def counted(self: Condition, params: Any, near: Any) -> Any:
+        solved.append(params)
+        if len(solved) == calls:
+            raise KeyboardInterrupt
+        return answer(self, params, near)
+
+    def fitted() -> tuple[cf.Fit, int]:
+        before = len(solved)
+        result = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.42}, ["S", "S0"], folder=tmp_path)
+        return result, len(solved) - before
+
+    monkeypatch.setattr(Condition, "answer", counted)
+    with suppress(KeyboardInterrupt):  # the first trial is before the search, which keeps its best
+        assert not fitted()[0].complete
+    calls = 0
+    again, rest = fitted()
+    assert again.complete and same(again, found)
+    assert fitted()[1] == 0 < rest
+    monkeypatch.undo()
+    assert same(fitted()[0], found)
+
+
+def test_a_folder_of_parts_that_cannot_be_used(data: list[Any], tmp_path: Path) -> None:
+    (tmp_path / "parts").write_text("something else")
+    asked = (data[:1], {"S": 0.31, "S0": 0.42}, ["S"])
+    with pytest.raises(cf.ContfricError, match="parts of another version"):
+        cf.fit("coulomb", *asked, folder=tmp_path)
+    with pytest.raises(cf.ContfricError, match="is a path"):
+        cf.fit("coulomb", *asked, folder=3)  # type: ignore[arg-type]
+    assert (tmp_path / "parts").read_text() == "something else"
 
 
 def rows(path: Path) -> list[dict[str, str]]:

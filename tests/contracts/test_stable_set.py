@@ -62,6 +62,28 @@ def test_the_phase_is_that_of_the_starts(saddle: cf.Orbit) -> None:
         assert np.min(np.hypot(*apart.T)) < 1e-6
 
 
+@pytest.mark.parametrize("lines", [1, 2])
+def test_it_goes_on_from_its_folder(
+    edge: Any, saddle: cf.Orbit, tmp_path: Path, monkeypatch, lines: int
+) -> None:
+    """Stopped after any stretch it has the same bits; from the folder alone nothing is followed anew."""
+    told: list[str] = []
+
+    def stop(text: str) -> None:
+        told.append(text)
+        if len(told) == lines:
+            raise KeyboardInterrupt
+
+    part = cf.stable_set(saddle, RANGES, max_step=0.08, folder=tmp_path, progress=stop)
+    assert not part.complete and len(told) == lines
+    assert told[0].startswith(f"{min(51, len(edge.states[0]))} points of a half")
+    for _ in range(2):
+        again = cf.stable_set(saddle, RANGES, max_step=0.08, folder=tmp_path)
+        assert again.points.tobytes() == edge.points.tobytes() and again.ends == edge.ends
+        assert [b.tolist() for b in again.breaks] == [b.tolist() for b in edge.breaks]
+        monkeypatch.setattr("contfric.response.stable_half.Half.grow", None)  # not to be called
+
+
 def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
     assert len(edge.to_dataframe()) == len(edge.points)
     assert edge.plot().get_xlabel() == "$x$"
