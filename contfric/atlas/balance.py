@@ -137,6 +137,8 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit, test) for e in events for test in e.tests):
                 below = above = None
+            if any(t.surface in e.orbit.model.settled_sides for e in events for t in e.tests):
+                below = above = None  # incomplete chatter: beyond it branches are infinitely many
             if _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
                 below = above = None  # beyond it orbits have another offset, each of a continuum
             yield Balance(number, b.label, value, times * period, below, above)

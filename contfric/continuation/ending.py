@@ -10,7 +10,6 @@ from contfric.continuation.outcomes import NoJump, outcome_at
 from contfric.continuation.places import places_of
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import entered_at, thrown_at
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
@@ -207,15 +206,14 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
     for place in places_of(bifurcation)[:1]:
-        whole = orbit.as_whole()
-        if goes_nowhere(whole, (place.segment + 1) % len(whole.itinerary)):
-            return continuous
         try:
-            outcome_at(whole, place, kind)
+            outcome_at(orbit.as_whole(), place, kind)
         except NoJump:
             return continuous
         except NotationError:
             return ""
+        if orbit.model.filippov:
+            return continuous
     return ""
 
 

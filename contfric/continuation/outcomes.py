@@ -38,7 +38,7 @@ from dataclasses import dataclass, field
 
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.standing_slides import goes_nowhere, left_out
+from contfric.continuation.standing_slides import goes_nowhere, left_out, only_touches, touch_alone
 from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
@@ -173,6 +173,8 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     _rest_mode(orbit, i, itinerary[i][1])
     if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
+    if only_touches(orbit, j):
+        return Outcome(*touch_alone(orbit, j))
     _check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
@@ -368,10 +370,8 @@ def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
     """Check that rest would be left with an acceleration: only then can it be held."""
-    # where nothing jumps a rate is rounding, however large
-    if departs is not None and (
-        orbit.model.filippov or not leaving_rate(orbit, rest, departs, joint) > NO_JUMP
-    ):
+    jumps = not orbit.model.filippov  # else a rate is rounding, however large
+    if departs is not None and not (jumps and leaving_rate(orbit, rest, departs, joint) > NO_JUMP):
         raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
 
 

@@ -11,7 +11,7 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import point_before
 from contfric.continuation.standing_slides import goes_nowhere
-from contfric.continuation.touching import is_rate_of, rate_along
+from contfric.continuation.touching import is_rate_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import Margin, Test, inside_sign
 from contfric.signature.holds import ends_rest, is_hold
@@ -197,9 +197,6 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     if limit != first or not here.model.filippov or is_hold(here.itinerary[i][1]):
         return limit
     if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
-        return first
-    at_start = rate_along(here, *here.itinerary[i], here.begins[i])
-    if abs(at_start) < _NEARLY_REACHED:
         return first
     for k, other in enumerate(tests):
         tangential = other.margin is Margin.EXIT and abs(point.tests[k]) < _NEARLY_REACHED

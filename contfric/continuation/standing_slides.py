@@ -1,10 +1,12 @@
-"""Slides that stand in their equilibrium: what a slide is whose amplitude has shrunk to nothing.
+"""Segments that are nothing where nothing jumps: slides that stand in their equilibrium, and mere touches.
 
 Where no force but a spring's acts on what slides, a slide from a stop just beyond the limit of rest lasts
 half a natural period however small it is: it ends inside the limit, by as much. As its amplitude shrinks to
 nothing its margins and those of the stops at both of its ends vanish together, each as a multiple of one
 number. So which of them is located first is rounding. It is one event: at the stop before the slide the load
 is at its limit (SS). Without the slide the solution is the same.
+
+Motion that just touches a surface on which it could slide does so for no time, and goes on as before.
 """
 
 from __future__ import annotations
@@ -12,12 +14,15 @@ from __future__ import annotations
 from contfric.continuation.touching import rate_along
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import time_unit
 from contfric.orbit.system import Margin, Test
 from contfric.signature.edits import Edit, drop
 from contfric.signature.holds import is_hold
 
 #: Acceleration below which a slide does not move: where Newton fails just before the event, what is left.
 STANDS = 1e-5
+#: Sliding from a touch on lasts as the root of how far the touch is beyond the surface, and that is rounding.
+_TOUCHES = 1e-4
 
 
 def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
@@ -46,3 +51,19 @@ def left_out(orbit: Orbit, i: int) -> tuple[Edit, dict[tuple[int, int], FloatArr
     if not behind:  # the rest that follows begins the orbit
         stop[0] -= orbit.period
     return drop(i), {(behind, -1): stop}, reason
+
+
+def only_touches(orbit: Orbit, j: int) -> bool:
+    """Tell whether segment ``j`` moves on a surface for no time, between two of one mode; nothing jumps."""
+    itinerary = orbit.itinerary
+    lasts = orbit.ends[j, 0] - orbit.cycle[j, 0]
+    same = itinerary[j - 1][0] == itinerary[(j + 1) % len(itinerary)][0]
+    return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))
+
+
+def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, dict[tuple[int, int], FloatArray], str]:
+    """Return the edit that makes one segment of two between which motion only touches a surface, and why."""
+    count = len(orbit.itinerary)
+    behind = (j + 1) % count
+    edit = Edit(frozenset({j, behind}), {(j - 1) % count: orbit.itinerary[behind][1]})
+    return edit, {}, f"segment {j + 1} vanishes: its surface is only touched"

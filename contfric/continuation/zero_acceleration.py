@@ -15,7 +15,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import inside_sign, mode_domains
-from contfric.signature.holds import left_surface
+from contfric.signature.holds import is_hold, left_surface
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
 #: would be left with depends on them monotonically, one would be enough, as in every model of a load.
@@ -157,6 +157,7 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     gap = orbit.flow.observe(observable, float(start[0]), start[1:]) - level
     # after a reset that has just touched, the solution is at its start again: no touch of its own
     rests = model.reset_at(orbit.itinerary[i][0], surface) is None
+    rests = rests and not (found and _slides_off(orbit, i, surface))  # as every orbit there does
     if rests and abs(rises) < _ZERO and abs(gap) < _EQUAL * (1.0 + abs(level)):
         return np.array(start)  # it begins with the touch
     if not found:
@@ -181,6 +182,20 @@ def only_comes_back(orbit: Orbit, i: int, surface: str) -> bool:
     )
     heights = [sign * (value - level) for value in (begin, *inside, end)]
     return bool(inside) and all(b > max(a, c) for a, b, c in zip(heights, heights[1:], heights[2:]))
+
+
+def _slides_off(orbit: Orbit, i: int, surface: str) -> bool:
+    """Tell whether a segment leaves a surface on which the one before it moves, and where nothing jumps.
+
+    Sliding ends where the field on one side no longer points to the surface: motion leaves by a tangent.
+    """
+    before, exit_ = orbit.itinerary[i - 1]
+    return (
+        orbit.model.filippov
+        and not is_hold(exit_)
+        and exit_ != surface
+        and orbit.model.lies_on(before, surface)
+    )
 
 
 def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:

@@ -230,6 +230,22 @@ def _flown(a: float, e: float) -> float:
     return float("inf")
 
 
+def test_indices_are_not_summed_where_chatter_is_not_complete_any_more() -> None:
+    """Branches with any number of impacts come together there: all of them are never in a diagram."""
+    draw = np.random.default_rng(15)
+    params = {"a": draw.uniform(1.3, 1.5), "e": draw.uniform(0.4, 0.48)}
+    orbit = cf.find_orbit("bouncing-ball", params, state=[3.0, 0.0])
+    diagram = cf.explore(orbit, "a", (1.25, 1.75), max_periods=1)
+    lost = [
+        k for k, node in enumerate(diagram.nodes) if "table_lift" in str(node.bifurcation.tests)
+    ]
+    assert len(lost) == 1
+    assert "incomplete chatter" in str(diagram.loose_ends[0])
+    checked = diagram.verify(1)
+    assert checked.passed, str(checked)
+    assert all(b.below is None and b.above is None for b in checked.balances if b.event in lost)
+
+
 @pytest.mark.parametrize("e", [0.2, 0.5])
 def test_quantities_and_gradients_of_chatter(e: float) -> None:
     def orbit(a: float, e: float) -> cf.Orbit:
