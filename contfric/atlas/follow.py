@@ -97,6 +97,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     # the forms are the same both times where the event is known roughly; what else the second time tries is
     # what local conditions exclude, and these are not asked of many contacts
     once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
+    tried: set[tuple[object, ...]] = set()  # by what an orbit is solved from: it ends the same
     for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
         itineraries: set[Itinerary] = set()
@@ -105,6 +106,10 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
         for candidate in in_order(proposed) if composes(orbit) else proposed:
             jumps = jumps or (candidate.has_hold and not orbit.model.filippov)
+            if candidate.orbit is not None:
+                if (start := _start_of(candidate)) in tried:
+                    continue
+                tried.add(start)
             accepted = _judge(state, event, candidate) or accepted
             if (
                 event.bifurcation.orbit is not orbit
@@ -124,6 +129,15 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
             return
     if not jumps:  # else motions near the event are not near what follows it
         _follow_flow(state, event)
+
+
+def _start_of(candidate: Candidate) -> tuple[object, ...]:
+    """Return what a candidate is solved from; two with the same are one."""
+    orbit, away = candidate.orbit, candidate.away
+    assert orbit is not None
+    system = orbit.system
+    moves = b"" if away is None else away.tobytes()
+    return system.itinerary, system.periods, system.half, orbit.joints.tobytes(), moves
 
 
 def _follow_flow(state: Exploration, event: Event) -> None:

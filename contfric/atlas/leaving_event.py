@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain
 
@@ -52,7 +52,7 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     assert orbit is not None
     settings = settings_for(orbit, state.settings)
     if candidate.away is not None:
-        branch = _leave_beside(state, orbit, candidate.away, event, settings)
+        branch = _leave_beside(state, orbit, _straight(candidate.away), event, settings)
         return branch or _leave_together(state, orbit, event, settings)
     longest: tuple[Orbit, Side] | None = None
     for first_step in _NEAR_EVENT:
@@ -127,24 +127,30 @@ def _is_along(one: Point, other: Point, settings: Settings) -> bool:
     return bool(1.0 - abs(along + one.slope * other.slope * settings.scale) < _ONE_WAY)
 
 
+def _straight(away: FloatArray) -> Callable[[float], FloatArray]:
+    """Return how joints move by a distance in one direction."""
+    return lambda distance: distance * away
+
+
 def _leave_beside(
     state: Exploration,
     orbit: Orbit,
-    away: FloatArray,
+    way: Callable[[float], FloatArray],
     event: Event,
     settings: Settings,
     share: float = 0.0,
 ) -> Branch | None:
     """Trace away from an event at which the new orbit is singular, from a short distance off it.
 
-    ``share`` is that of the parameter in the direction ``away``, where that is known.
+    ``way`` tells how joints move by a distance; ``share`` is that of the parameter, where it is known.
     """
     active = orbit.model.index_of(settings.parameter)
-    known = ((away, share),) if share else ()
     for distance in _distances(orbit, event):
         vector = orbit.vector.copy()
         vector[active] += distance * orbit.period * share
-        joints = orbit.joints + distance * orbit.period * away
+        away = way(distance * orbit.period)
+        known = ((away / np.max(np.abs(away)), share),) if share else ()
+        joints = orbit.joints + away
         moved = replace(orbit, joints=joints, vector=vector)
         for tangent, slope in chain(known, directions(moved, active)):
             point = first_point(moved, settings, tangent, slope)
@@ -203,7 +209,7 @@ def leave_singular(
     active = orbit.model.index_of(settings.parameter)
     lines = ((away, 0.0) for away in _line_of(orbit, active, settings))
     for away, slope in chain(ways_in_plane(orbit, active), lines):
-        branch = _leave_beside(state, orbit, away, event, settings, slope)
+        branch = _leave_beside(state, orbit, _straight(away), event, settings, slope)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
@@ -214,7 +220,7 @@ def _leave_together(
 ) -> Branch | None:
     """Trace away from an event at which several places of an orbit open at once."""
     for away in opening_together(orbit, orbit.model.index_of(settings.parameter)):
-        branch = _leave_beside(state, orbit, away, event, settings)
+        branch = _leave_beside(state, orbit, away.at, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None

@@ -7,14 +7,16 @@ lambda in the parameter, the left null vectors L of F_z leave
 
     L F_lambda lambda + sum_j L d_j eps_j^p_j = 0,
 
-k equations for the k numbers ``eps_j^p_j``. Their roots are how far each place opens. One place alone may
-open as it likes: its direction is v. A start that opens several of them in another proportion is no guess
-for Newton's method, whose matrix is nearly singular in all of them.
+k equations for the k numbers ``eps_j^p_j``. Their roots are how far each place opens: by the root of lambda
+where the order is two, by the third root where it is three. So where orders differ the proportion depends on
+the distance. One place alone may open as it likes: its direction is v. A start that opens several of them in
+another proportion is no guess for Newton's method, whose matrix is nearly singular in all of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +35,35 @@ _OWN = 1e-3
 _STEP = 1e-3
 
 
-def opening_together(orbit: Orbit, active: int) -> Iterator[FloatArray]:
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """How the joints of an orbit move away from an event at which several places of it open at once.
+
+    Attributes
+    ----------
+    freedoms : ndarray, shape (k, N, m)
+        Of the places, each with the largest component 1.
+    sizes : ndarray, shape (k,)
+        How far each place opens at a unit of the parameter.
+    orders : ndarray, shape (k,)
+        The power of each freedom that the parameter is.
+    """
+
+    freedoms: FloatArray
+    sizes: FloatArray
+    orders: FloatArray
+
+    def at(self, distance: float) -> FloatArray:
+        """Return how the joints move where the place that opens farthest does so by a distance."""
+        opens = self.sizes != 0.0
+        shift = np.min((distance / np.abs(self.sizes[opens])) ** self.orders[opens])
+        moved: FloatArray = np.tensordot(
+            self.sizes * shift ** (1.0 / self.orders), self.freedoms, axes=1
+        )
+        return moved
+
+
+def opening_together(orbit: Orbit, active: int) -> Iterator[Opening]:
     """Yield how the joints of an orbit at an event move where several places of it open at once.
 
     For either side of the event; nothing where fewer than two places are singular, or where their freedoms
@@ -55,9 +85,8 @@ def opening_together(orbit: Orbit, active: int) -> Iterator[FloatArray]:
         return
     for side in (powers, -powers):
         sizes = _sizes(orbit, freedoms, orders, side)
-        if sizes is not None:
-            away = np.tensordot(sizes, freedoms, axes=1)
-            yield away / np.max(np.abs(away))
+        if sizes is not None and np.any(sizes):
+            yield Opening(freedoms, sizes, orders)
 
 
 def _of_places(null: FloatArray) -> FloatArray | None:
@@ -125,7 +154,7 @@ def _sizes(
 ) -> FloatArray | None:
     """Return how far each place opens at a unit of the parameter; None where a square would be negative.
 
-    A square has two roots: that which makes the segment at its place last longer.
+    A square has two roots: that which a solution has (:func:`_longer`).
     """
     roots = np.sign(powers) * np.abs(powers) ** (1.0 / orders)
     for k in np.flatnonzero(orders == 2.0):
@@ -136,8 +165,12 @@ def _sizes(
 
 
 def _longer(orbit: Orbit, freedom: FloatArray) -> float:
-    """Return the sign with which a freedom makes the segments of no length last."""
+    """Return the sign with which a freedom makes the segments of no length last.
+
+    A segment that is as long as before ends at the first zero, which a tangency has before it.
+    """
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
     grows = np.roll(freedom[:, 0], -1) - freedom[:, 0]
     short = lasts[: len(grows)] < SHORT * time_unit(orbit)
-    return -1.0 if np.sum(grows[short]) < 0.0 else 1.0
+    change = float(np.sum(grows[short])) or -float(np.sum(freedom[:, 0]))
+    return -1.0 if change < 0.0 else 1.0

@@ -86,7 +86,9 @@ def sequences_of(
     if not forms:
         return
     longest = lengths(unit.periods, unit.half, most_periods)
-    relations = _relations(incident, forms, active) if longest[-1] > 1 else None
+    # one location has two outcomes over a period, and what arrives is one of them
+    several = longest[-1] > 1 or len(forms) > _ONE_LOCATION
+    relations = _relations(incident, forms, active) if several else None
     for length in longest:
         if count(len(forms), length) > MOST_SEQUENCES:
             why = f"{count(len(forms), length)} sequences: more than {MOST_SEQUENCES} are not tried"
@@ -104,6 +106,8 @@ def sequences_of(
                 yield Candidate(reason, None, _LOCAL)
 
 
+#: Forms of a unit with one location. With k of them there are 2^k and more, of which few are possible.
+_ONE_LOCATION = 2
 #: Why a sequence is refused that the local conditions exclude.
 _LOCAL = "to first order it violates a condition on both sides of the event"
 

@@ -12,6 +12,11 @@ order: the length of a hold at a touch of rest, the end of a slide that stops ta
 length. What it does is of order p: ``F(z + eps v) = eps^p d``, and ``q = eps^p`` is its unknown. The
 inequalities are the margins that vanish at the event.
 
+Where a hold can just not be left inside any more, the acceleration ``a = k t^2 / 2 + w`` with which it would
+be left touches zero. For w > 0 it lasts. For w < 0 there are a slide from -2 d to d, ``d^2 = -2 w / k``, and
+a second hold. The slide moves the mass by the fourth power of d, the square of w. So to first order the
+relation of this form is that of the form with one hold; its inequality is -w >= 0 in place of w >= 0.
+
 For a sequence of n units these are n (m + k) + n units' joints and one lambda: a ray on each side. A sequence
 exists on a side if its ray obeys all inequalities. For places with two outcomes each this is the linear
 complementarity problem of docs/bridges.md, written so that an outcome of any kind fits.
@@ -19,16 +24,20 @@ complementarity problem of docs/bridges.md, written so that an outcome of any ki
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.gradients import closing, gradient_of
+from contfric.continuation.gradients import closing, gradient_of, held_gradient
 from contfric.continuation.incident import vanishing
+from contfric.continuation.outcomes import NEARLY_NO_LENGTH
 from contfric.continuation.unit import Form
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import jacobian_blocks, linearised
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import time_unit
+from contfric.orbit.system import Margin
+from contfric.signature.holds import TOUCH, is_hold
 
 #: Singular values below this, relative to the largest, belong to null directions: events are located to
 #: 1e-13, and directions at a tangency to the root of that.
@@ -75,6 +84,7 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
     active : index of the parameter that varies
     least : margins below it vanish
     """
+    form, parted = _without_slides(form)
     orbit = form.orbit
     system, m = orbit.system, orbit.joints.shape[1]
     a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector)
@@ -87,7 +97,7 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
         -(right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer
     )  # inner joints by (u, u', lambda)
     margins, signed = [], np.zeros(len(free))
-    for gradient, slope in _gradients(orbit, active, least):
+    for gradient, slope in _gradients(orbit, active, least, parted):
         on_inner = gradient[1:-1].ravel()
         along = free @ on_inner
         bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.max(np.abs(on_inner), initial=0.0)))
@@ -161,16 +171,52 @@ def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
 # ---------------------------------------------------------------------- the margins that vanish
 
 
-def _gradients(orbit: Orbit, active: int, least: float) -> list[tuple[FloatArray, float]]:
-    """Return the gradients of the vanishing margins on the joints, shape (N + 1, m), and on the parameter."""
-    whole = orbit.as_whole()
+def _gradients(
+    orbit: Orbit, active: int, least: float, parted: tuple[int, ...]
+) -> list[tuple[FloatArray, float]]:
+    """Return the gradients of the vanishing margins on the joints, shape (N + 1, m), and on the parameter.
+
+    A hold in ``parted`` is one that cannot be left inside: that margin counts with the other sign.
+    """
+    whole, count = orbit.as_whole(), orbit.system.segments
     found = []
     for place, _ in vanishing(whole, least):
-        if place.segment < orbit.system.segments:
-            gradient = gradient_of(whole, place, orbit.system.segments, active)
-            if gradient is not None:
-                found.append(gradient)
+        held = place.margin is Margin.HELD
+        if place.segment >= count or (held and place.segment in parted):
+            continue
+        gradient = (
+            held_gradient(whole, place.segment, count, active)
+            if held
+            else gradient_of(whole, place, count, active)
+        )
+        if gradient is not None:
+            found.append(gradient)
+    for segment in parted:
+        gradient = held_gradient(whole, segment, count, active)
+        if gradient is not None:
+            found.append((-gradient[0], -gradient[1]))
     return found
+
+
+def _without_slides(form: Form) -> tuple[Form, tuple[int, ...]]:
+    """Return a form without slides of no length between two holds, and the holds that they part."""
+    gone: set[int] = set()
+    parted, count = [], len(form.itinerary)
+    unit = time_unit(form.orbit)
+    for h in range(count - 2):
+        (_, first), (_, second) = form.itinerary[h], form.itinerary[h + 2]
+        lasts = form.joints[h + 2, 0] - form.joints[h + 1, 0]
+        if is_hold(first) and second == TOUCH and abs(lasts) < NEARLY_NO_LENGTH * unit:
+            if h not in gone:
+                parted.append(h - len(gone))
+            gone |= {h + 1, h + 2}
+    if not gone:
+        return form, ()
+    kept = [i for i in range(count) if i not in gone]
+    itinerary = tuple(form.itinerary[i] for i in kept)
+    return replace(
+        form, itinerary=itinerary, joints=form.joints[kept], away=form.away[kept]
+    ), tuple(parted)
 
 
 # --------------------------------------------------------------------------------- sequences

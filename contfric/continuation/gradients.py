@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.zero_acceleration import touch_of
+from contfric.continuation.zero_acceleration import left_to, touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -58,6 +58,23 @@ def gradient_of(
     else:
         return None
     return sign * gradient, sign * slope
+
+
+def held_gradient(orbit: Orbit, i: int, count: int, active: int) -> tuple[FloatArray, float] | None:
+    """Return the gradient of the least acceleration with which a hold could be left inside, if it has one.
+
+    The time at which it is least is stationary: it does not move the value.
+    """
+    try:
+        touch = touch_of(orbit, i, None)
+    except NotationError:
+        return None
+    hold = next(hold for hold in orbit.system.holds if hold.segment == i)
+    sign, observable = left_to(orbit, orbit.itinerary[i][0], hold.departs)
+    m, gradient = len(touch), np.zeros((count + 1, len(touch)))
+    grad = orbit.flow.rate_gradient(hold.departs, observable, float(touch[0]), touch[1:], active)
+    gradient[i], moves = carried(orbit, i, touch, grad[:m], active)
+    return sign * gradient, sign * (float(grad[m]) + moves)
 
 
 def _sign(orbit: Orbit, place: Test) -> float:

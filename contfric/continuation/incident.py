@@ -26,7 +26,7 @@ import numpy as np
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.outcomes import NO_LENGTH_AT_TOUCH, Outcome, RestsForEver, outcome_at
-from contfric.continuation.places import normal_place, places_of
+from contfric.continuation.places import TANGENTIAL, normal_place, places_of
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -214,7 +214,7 @@ def vanishing(orbit: Orbit, least: float) -> list[tuple[Test, Kind]]:
     """Return the places of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
     found: dict[Test, Kind] = {}
     for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
-        if not abs(value) < least:
+        if not abs(value) < (least if is_linear(test, orbit) else max(least, TANGENTIAL)):
             continue
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:
@@ -222,6 +222,16 @@ def vanishing(orbit: Orbit, least: float) -> list[tuple[Test, Kind]]:
     for place in _vanished(orbit):
         found.setdefault(place, Kind.GS)
     return list(found.items())
+
+
+def is_linear(test: Test, orbit: Orbit) -> bool:
+    """Tell whether a margin goes through zero at an event, and does not reach it with its root.
+
+    The rate at an exit does where an orbit comes to the tangency; a hold may be left anywhere.
+    """
+    return test.margin is not Margin.EXIT or any(
+        hold.segment == test.segment for hold in orbit.system.holds
+    )
 
 
 def _vanished(orbit: Orbit) -> Iterator[Test]:

@@ -19,9 +19,22 @@ def places_of(bifurcation: Bifurcation) -> list[Test]:
     return places
 
 
+#: The rate with which an exit is met that is tangential: an orbit misses the tangency by half of the square
+#: of the rate, which is rounding below this.
+TANGENTIAL = 1e-6
+
+
 def normal_place(test: Test, orbit: Orbit) -> Test:
-    """Return a test of what belongs to a hold as one of the hold itself."""
+    """Return a test of what belongs to a hold as one of the hold itself, and one of an exit as of the exit.
+
+    Where a segment meets its exit without rate, a touch of that surface inside of it is the exit itself.
+    """
     hold = hold_of_test(test, orbit)
+    if hold is None and test.margin is Margin.INTERIOR:
+        end = Test(Margin.EXIT, test.segment, test.surface)
+        if orbit.itinerary[test.segment][1] == test.surface and end in orbit.system.tests:
+            at_exit = abs(orbit.margins[orbit.system.tests.index(end)]) < TANGENTIAL
+            return end if at_exit else test
     if hold is None or hold.segment == test.segment:
         return test
     return Test(Margin.EXIT, hold.segment, hold.leaves)

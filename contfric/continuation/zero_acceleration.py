@@ -76,7 +76,7 @@ def _crossing(rate: Callable[[float], float], a: float, b: float) -> float:
 def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], float]:
     """Return the acceleration with which a rest would be left, as a function of time."""
     rest, flow = orbit.itinerary[i][0], orbit.flow
-    sign, observable = _left(orbit, rest, departs)
+    sign, observable = left_to(orbit, rest, departs)
     begin, start = float(orbit.begins[i, 0]), orbit.begins[i, 1:]
 
     def rate(time: float) -> float:
@@ -87,7 +87,7 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
     return rate
 
 
-def _left(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
+def left_to(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
     """Return the side to which a rest is left into a departing mode, and the observable that tells."""
     model = orbit.model
     leaves = left_surface(model, mode, departs)
@@ -97,7 +97,7 @@ def _left(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
 
 def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
     """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
-    sign, observable = _left(orbit, mode, departs)
+    sign, observable = left_to(orbit, mode, departs)
     return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
 
 

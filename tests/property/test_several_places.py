@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.several_places import opening_together
+from contfric.atlas.several_places import Opening, opening_together
 from contfric.continuation.candidates import sequences_of
 from contfric.continuation.events import TERMINAL
 from contfric.continuation.incident import Incident, incident_forms
@@ -44,9 +44,9 @@ def test_places_that_are_alike_open_alike() -> None:
             for form in opened(incident):
                 for copies in (2, 3):
                     orbit, away = incident.unit.orbit((form,) * copies)
-                    ways = list(opening_together(orbit, active))
+                    ways = [way.at(np.max(np.abs(away))) for way in opening_together(orbit, active)]
                     assert len(ways) == 2
-                    wanted = away / np.max(np.abs(away))
+                    wanted = away
                     for way, sign in zip(
                         ways, np.sign([w[:, 0] @ wanted for w in ways]), strict=True
                     ):
@@ -63,6 +63,35 @@ def test_one_place_needs_no_proportion() -> None:
             if candidate.orbit is not None and not candidate.orbit.system.half:
                 places = 0 if candidate.away is None else int(np.sum(candidate.away[:, 0] > 0.0))
                 assert places > 1 or not list(opening_together(candidate.orbit, active))
+
+
+#: In its events one half of an orbit stops tangentially, and a slide of no length comes in in the other.
+MIXED = {"Omega": 0.224148285, "S": 0.40331387, "S0": 0.88561545, "h": 0.276719682, "zeta": 1e-7}
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_places_of_different_orders(seed: int) -> None:
+    """A root and a third root of the parameter: the bridge with one hold is found from either side of it."""
+    rng = np.random.default_rng(seed)
+    params = {name: value * (1.0 + rng.uniform(-0.01, 0.01)) for name, value in MIXED.items()}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    diagram = cf.explore(orbit, "h", (0.165, 0.424))
+    plain = next(b for b in diagram.branches if b.name == "2s")
+    again = cf.explore(plain[len(plain) // 2], "h", (0.165, 0.424))
+    assert any("1hold" in b.name for b in diagram.branches)
+    assert sorted(b.name for b in again.branches) == sorted(b.name for b in diagram.branches)
+
+
+def test_orders_differ() -> None:
+    """Half as far away the places open in another proportion, as their orders say."""
+    freedoms = np.zeros((2, 4, 3))
+    freedoms[0, 1, 0] = freedoms[1, 3, 0] = 1.0
+    way = Opening(freedoms, np.array([-2.0, 5.0]), np.array([2.0, 3.0]))
+    for distance in (1e-2, 1e-4):
+        moved = way.at(distance)[:, 0]
+        assert np.max(np.abs(moved)) == pytest.approx(distance, rel=1e-12)
+        assert (moved[1] / 2.0) ** 2 == pytest.approx((moved[3] / 5.0) ** 3, rel=1e-9)
+        assert moved[1] < 0.0 < moved[3]
 
 
 @pytest.mark.slow

@@ -1,0 +1,86 @@
+"""Local conditions at sliding events: what exists next to one is not refused, whatever is held there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+import contfric as cf
+from contfric.atlas.diagram import Diagram
+from contfric.continuation.branch import Branch
+from contfric.continuation.conditions import possible, relation_of
+from contfric.continuation.events import Kind
+from contfric.continuation.incident import incident_forms, vanishing
+from contfric.continuation.places import normal_place
+from contfric.orbit.margins import Margin
+
+#: In diagrams near this one, in zeta, a hold can just not be left inside any more.
+HELD = {"Omega": 0.12784, "S": 0.020946, "S0": 0.046345, "h": 0.04157, "zeta": 0.00483}
+WIDTH = 0.06
+#: In its diagram, in h, slides stop tangentially.
+STOPS = {"Omega": 0.224148285, "S": 0.40331387, "S0": 0.88561545, "h": 0.276719682, "zeta": 1e-7}
+#: A rate this large at an exit is the root of what an event is located to.
+ROOT = 1e-8
+
+
+def diagram(seed: int) -> Diagram:
+    """Return one of the diagrams, its parameters moved by up to a thousandth."""
+    rng = np.random.default_rng(seed)
+    moved = {name: value * (1.0 + rng.uniform(-0.001, 0.001)) for name, value in HELD.items()}
+    orbit = cf.find_orbit("coulomb", moved, longest=1000)
+    return cf.explore(orbit, "zeta", (moved["zeta"] - WIDTH, moved["zeta"] + WIDTH))
+
+
+def _ahead(branch: Branch, value: float) -> bool:
+    """Tell whether a branch lies above the event at which it ends."""
+    ends = branch.values[[0, -1]]
+    at, inside = ((0, 1), (-1, -2))[int(np.argmin(np.abs(ends - value)))]
+    return bool(branch.values[inside] > branch.values[at])
+
+
+def test_hold_that_cannot_be_left_inside() -> None:
+    """The bridge with one hold exists on one side of such an event, that with two holds on the other."""
+    asked = 0
+    for seed in range(2):
+        found = diagram(seed)
+        active = found.model.index_of(found.parameter)
+        for event in found.events:
+            tests = event.bifurcation.tests
+            if not any(test.margin is Margin.HELD for test in tests):
+                continue
+            incident = incident_forms(event.bifurcation)
+            relations = [relation_of(form, active, incident.least) for form in incident.forms]
+            known = [relation for relation in relations if relation is not None]
+            assert len(known) == len(relations) == 2
+            sides = possible(known, [(0,), (1,)])
+            assert sorted(sides) == [(False, True), (True, False)], sides
+            value = event.bifurcation.params[found.parameter]
+            ahead = [_ahead(found.branches[index], value) for index in event.branches]
+            assert sorted(ahead) == [False, True]
+            asked += 1
+    assert asked
+
+
+def test_exit_that_is_tangential_to_rounding() -> None:
+    """A stop whose time is off by the root of rounding solves the same equations: it is tangential there."""
+    orbit = cf.find_orbit("coulomb", STOPS, longest=1000)
+    found = cf.explore(orbit, "h", (0.165, 0.424))
+    asked = 0
+    for event in found.events:
+        orbit = event.bifurcation.orbit.as_whole()
+        for test in event.bifurcation.tests:
+            if event.bifurcation.kind is not Kind.GS or test.margin is not Margin.EXIT:
+                continue
+            if any(hold.segment == test.segment for hold in orbit.system.holds):
+                continue
+            joints = orbit.joints.copy()
+            joints[(test.segment + 1) % len(joints), 0] -= ROOT * orbit.period
+            moved = replace(orbit, joints=joints)
+            rate = moved.margins[moved.system.tests.index(test)]
+            if not 1e-9 < abs(rate) < 1e-6:
+                continue
+            places = [place for place, _ in vanishing(moved, 1e-9)]
+            assert normal_place(test, moved) in places
+            asked += 1
+    assert asked
