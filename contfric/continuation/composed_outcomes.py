@@ -107,7 +107,9 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
     model, (mode, exit_) = orbit.model, orbit.itinerary[i]
     touch = touch_of(orbit, i, surface)
     if only_comes_back(orbit, i, surface):
-        raise NotationError(f"segment {i + 1} leaves {surface} and comes back, and does not touch it between")
+        raise NotationError(
+            f"segment {i + 1} leaves {surface} and comes back, and does not touch it between"
+        )
     other, back = _there_and_back(model, mode, surface)
     edit = split(i, surface, (other, back), (mode, exit_))
     joints: Joints = {(i, 0): touch, (i, 1): touch}

@@ -42,8 +42,8 @@ _NEARLY = 1e-2
 _INSIDE = (1e-2, -1e-2, 1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5)
 #: Steps of Newton's method at one value, and trials of the value.
 _STEPS, _TRIALS = 8, 12
-#: How far, in second smallest singular values, the reduced equations are solved for: Newton's method converges
-#: to a distance of that value over the second derivative (Kantorovich), which is of order one or less.
+#: How far, in second smallest singular values, the reduced equations are solved for: Newton's method
+#: converges to a distance of that value over the second derivative (Kantorovich), of order one or less.
 _REACH = 10.0
 #: Second trial of the value, and how far from the first it may be found (relative to 1 + its size).
 _TRIAL, _FAR = 1e-6, 1e-2
@@ -151,7 +151,7 @@ def _next_to(whole: Orbit, active: int, within: float) -> Family | None:
     if size[-1] > _NEARLY * size[0]:
         return None
     distances = [d for d in _INSIDE if abs(d) < _REACH * size[-2]]
-    if not distances:  # several nearly vanish, as where a slide ends that is about to: no family is told there
+    if not distances:  # several nearly vanish, as where a slide is about to: no family is told
         return None
     border = left[:, -1], right[-1]
     along = right[-1].reshape(whole.joints.shape)

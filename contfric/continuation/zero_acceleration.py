@@ -174,14 +174,20 @@ def only_comes_back(orbit: Orbit, i: int, surface: str) -> bool:
     from the surface than what is before and after it, and touches nothing, whatever counts as small.
     """
     observable = orbit.model.surface_by_name[surface].observable
-    level, sign = orbit.flow.level(surface), inside_sign(orbit.model, orbit.itinerary[i][0], surface)
+    level, sign = (
+        orbit.flow.level(surface),
+        inside_sign(orbit.model, orbit.itinerary[i][0], surface),
+    )
     inside = [value for _, value in stationary_values(orbit, i, observable)]
     begin, end = (
         orbit.flow.observe(observable, float(joint[0]), joint[1:])
         for joint in (orbit.begins[i], orbit.ends[i])
     )
     heights = [sign * (value - level) for value in (begin, *inside, end)]
-    return bool(inside) and all(b > max(a, c) for a, b, c in zip(heights, heights[1:], heights[2:]))
+    beside = zip(heights[:-2], heights[2:], strict=True)
+    return bool(inside) and all(
+        height > max(pair) for height, pair in zip(heights[1:-1], beside, strict=True)
+    )
 
 
 def _slides_off(orbit: Orbit, i: int, surface: str) -> bool:

@@ -1,0 +1,100 @@
+"""A contact that slips a little is not at rest in between, and its branch has a side, however little."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.atlas.composed import _beside
+from contfric.continuation.events import ACCURACY
+from contfric.continuation.incident import incident_forms
+from contfric.continuation.zero_acceleration import only_comes_back
+from contfric.orbit.system import inside_sign
+
+SAMPLES = 2001
+
+
+def ten_contacts(seed: int) -> cf.Model:
+    """Return twenty random masses in a row, ten of which rub on the ground."""
+    draw = np.random.default_rng(seed)
+    beside = np.diag(draw.uniform(0.6, 1.4, 19) * 0.5, 1)
+    beside = beside + beside.T
+    stiffness = np.diag(draw.uniform(0.8, 1.2, 20) + beside.sum(axis=1)) - beside
+    mass = np.diag(draw.uniform(0.8, 1.2, 20))
+    rubs = {}
+    for k, i in enumerate(np.sort(draw.choice(np.arange(1, 21), 10, replace=False)), start=1):
+        kinetic = f"{draw.uniform(0.5, 1.5):.4f}*S"
+        rubs[f"b{k}"] = {"kind": "friction", "velocity": f"v{i}", "kinetic": kinetic}
+    return cf.Mechanism(
+        mass,
+        0.02 * stiffness,
+        stiffness,
+        contacts=rubs,
+        force={"q1": "cos(Omega*t)"},
+        parameters={"Omega": 1.0, "S": 0.03},
+        period="2*pi/Omega",
+    )
+
+
+def heights(orbit: cf.Orbit, i: int, surface: str, sign: int) -> Any:
+    """Return how far a segment is from a surface, at many times."""
+    flow, start = orbit.flow, orbit.begins[i]
+    observable, begin = orbit.model.surface_by_name[surface].observable, float(start[0])
+    times = np.linspace(0.0, float(orbit.ends[i, 0]) - begin, SAMPLES)
+    states = [flow.state(orbit.itinerary[i][0], begin, start[1:], float(t)) for t in times]
+    level = flow.level(surface)
+    found = [
+        flow.observe(observable, begin + float(t), y) for t, y in zip(times, states, strict=True)
+    ]
+    return sign * (np.array(found) - level)
+
+
+def test_a_segment_comes_back_where_nothing_inside_is_a_minimum() -> None:
+    told = []
+    for seed in range(6):
+        draw = np.random.default_rng(seed)
+        static, omega = draw.uniform(0.3, 0.6), draw.uniform(0.12, 0.5)
+        params = {"Omega": omega, "S": static * draw.uniform(0.7, 1.0), "S0": static, "h": 0.02}
+        orbit = cf.find_orbit("coulomb", params).as_whole()
+        for i, (mode, _) in enumerate(orbit.itinerary):
+            for surface in orbit.model.surface_by_name:
+                sign = inside_sign(orbit.model, mode, surface)
+                if not sign:
+                    continue
+                rises = np.sign(np.diff(heights(orbit, i, surface, sign)))
+                turns = rises[np.flatnonzero(rises[1:] != rises[:-1])]
+                farthest = len(turns) > 0 and bool(np.all(turns > 0.0))
+                assert only_comes_back(orbit, i, surface) == farthest
+                told.append(farthest)
+    assert told.count(True) >= 6 and told.count(False) >= 6
+
+
+@pytest.mark.parametrize("end", [0, -1])
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_side_of_a_branch_is_no_rounding(end: int, side: int) -> None:
+    ahead = np.array([0.0, -3e-14, 2e-14, -1e-14, 1e-7, 1e-4])
+    multipliers = np.full((len(ahead), 2), 0.5 + 0j)
+    multipliers[1:4, 0] = 1.0 + 1e-9  # where a slip has no length these are rounding, too
+    order = slice(None) if end == 0 else slice(None, None, -1)
+    values = {"Omega": (1.0 + side * ahead)[order]}
+    branch = cast(Any, SimpleNamespace(params=values, multipliers=multipliers[order]))
+    assert _beside(branch, end, "Omega", 1e-10) == (1, side)
+    assert _beside(branch, end, "Omega", 1e-3)[0] is None  # it does not reach beyond the event
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "above", "below"), [(4, 0.97996, 0.97994), (3, 0.94436, 0.94434)])
+def test_a_slip_that_is_about_to_vanish_opens_few_forms(
+    seed: int, above: float, below: float
+) -> None:
+    orbit = cf.find_orbit(ten_contacts(seed), {"Omega": above}, periods=1)
+    branch = cf.continue_orbit(orbit, "Omega", (below, above + 1e-5))
+    events = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
+    assert len(events) == 1 and events[0].kind == "CS" and events[0].accuracy > ACCURACY
+    incident = incident_forms(events[0])
+    assert len(incident.forms) <= 4  # two contacts change in either order, in each half
+    assert not any("touched" in form.reason for form in incident.forms)
