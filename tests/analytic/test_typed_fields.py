@@ -94,10 +94,7 @@ def by_ring(t, y):
 )
 def test_a_cycle_closes_by_scipy(tmp_path, text: str, start, field: Callable, kinks) -> None:
     """The field is one formula with its kinks, from which scipy starts again at each."""
-    model = typed(tmp_path, text)
-    report = cf.check_model(model)
-    assert report.ok, report
-    orbit = cf.find_orbit(model, **({} if start is None else {"state": start}))
+    orbit = cf.find_orbit(typed(tmp_path, text), **({} if start is None else {"state": start}))
     y, t = orbit.begins[0, 1:] + 1e-9, 0.0
     first = y
     while t < orbit.period:
@@ -137,6 +134,50 @@ resets:
   beak: {w: -d3*w}
   lower: {w: d1*w + kick, to: swings, from: [falls]}
 """
+
+SCHMITT = """
+name: schmitt
+states: [u]
+parameters: {Vs: 10.0, R: 2.0, C: 0.5, b: 0.4}
+autonomous: true
+surfaces: {high: {observable: u, level: b*Vs}, low: {observable: u, level: -b*Vs}}
+modes:
+  charges: {in: {high: -}, field: {u: (Vs - u)/(R*C)}}
+  discharges: {in: {low: +}, field: {u: (-Vs - u)/(R*C)}}
+symmetry: u -> -u
+spread: {u: 5}
+"""
+
+#: A bridge whose duty cycle is sampled, and cut off at 0 and 1 (Robert and Robert 2002).
+BRIDGE = """
+name: bridge
+states: [i, r]
+parameters: {E: 400.0, R: 40.0, L: 20.0e-3, Ts: 62.5e-6, k: 0.1, ref: 5.0}
+period: Ts
+surfaces: {switch: {observable: "mod(t, Ts)/Ts - r"}}
+modes:
+  plus: {in: {switch: -}, field: {i: (E - R*i)/L, r: 0}}
+  minus: {in: {switch: +}, field: {i: (-E - R*i)/L, r: 0}}
+resets: {tick: {r: "min(max(0.5 + k*(ref - i), 0), 1)", to: plus}}
+units: {t: 1.0e-5}
+spread: {i: 10, r: 1}
+"""
+
+
+def test_one_state_without_excitation_is_explored(tmp_path) -> None:
+    """A Schmitt trigger: no multiplier is left, T = 2 R C log((1 + b)/(1 - b))."""
+    orbit = cf.find_orbit(typed(tmp_path, SCHMITT))
+    (branch,) = cf.explore(orbit, "b", (0.1, 0.8)).branches
+    expected = 2.0 * np.log((1 + branch.values) / (1 - branch.values))
+    assert branch.period == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_kink_of_a_reset_is_said(tmp_path) -> None:
+    """Without saturation there is none, and one that no motion meets is none."""
+    assert "the reset at 'tick' has a kink where" in str(cf.check_model(typed(tmp_path, BRIDGE)))
+    plain = BRIDGE.replace("min(max(0.5 + k*(ref - i), 0), 1)", "0.5 + k*(ref - i)")
+    along = plain.replace("(ref - i)", "(ref - i) + 0*abs(r + 5)")
+    assert "has a kink" not in str(cf.check_model(typed(tmp_path, along)))
 
 
 def until(field: Callable, y, event: Callable, direction: float):
