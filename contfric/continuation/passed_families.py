@@ -35,7 +35,7 @@ _RESERVE = 2.0
 def with_families(branch: Branch, settings: Settings) -> Branch:
     """Return a symmetric branch with the branch points at which it passes families of asymmetric orbits."""
     mu = branch.turn_multipliers
-    if mu is None or not branch.system.half or branch.bridge or len(branch) < 3:
+    if mu is None or not mu.size or not branch.system.half or branch.bridge or len(branch) < 3:
         return branch
     away = np.min(np.abs(mu + 1.0), axis=1)
     near = (away[1:-1] < _TOUCHES) & (away[1:-1] <= away[:-2]) & (away[1:-1] < away[2:])

@@ -70,7 +70,8 @@ class Landing:
     def lands(self) -> dict[str, int]:
         """Return the surfaces that all images lie on, and the side to which each is left.
 
-        For the reset's own surface that side is +1 where motion goes back, -1 where it passes.
+        For the reset's own surface that side is +1 where motion goes back, -1 where it passes. It is 0 where
+        all modes that the reset leads to move on the surface.
         """
         images = [(d, t, self._image(t, y)) for d, t, y in self.arrivals]
         met = [
@@ -99,6 +100,12 @@ class Landing:
     ) -> int:
         own = surface == self.surface
         named = {lead.mode for lead in self.leads}
+        if (
+            named
+            and not own
+            and {d.signs[surface] for d in self.domains if d.own_mode in named} == {0}
+        ):
+            return 0  # it leads into motion on that surface
         verdicts, asked, passed = Counter[int](), Counter[int](), True
         for before, t, y in images:
             behind = self._behind(before, met, t, y)

@@ -155,7 +155,7 @@ class Reset:
     changes : observables whose values the map changes; the domains that can follow are those that differ in
         the signs of these
     lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
-        surface that is +1 where it goes back (a wall), -1 where it passes
+        surface that is +1 where it goes back (a wall), -1 where it passes. 0 where it goes on sliding there
     leads : the modes after the reset, the first that holds; else the mode before it where that holds, or
         another one
     modes : modes in which it acts; by default (empty) those that lie on one side of the surface

@@ -20,7 +20,7 @@ from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.grammar import parse
-from contfric.models.regions import domains_of, engine_order
+from contfric.models.regions import domains_of, engine_order, is_possible
 
 #: Functions with kinks: what they are on either side of a surface only formulas tell.
 _KINKED = frozenset({"abs", "sign", "where", "min", "max"})
@@ -61,7 +61,8 @@ def _joined(key: _Key) -> dict[str, str]:
     first = {mode.name: mode.name for mode in description.modes}
     if len(first) < 2:
         return first
-    domains = domains_of(description, engine_order(description))
+    surfaces = engine_order(description)
+    domains = domains_of(description, surfaces)
     if len({tuple(d.signs.items()) for d in domains}) < len(domains):
         # modes overlap: which of them motion is in is part of its state, none are joined but by the phase
         return {**first, **_halves(description)}
@@ -77,7 +78,7 @@ def _joined(key: _Key) -> dict[str, str]:
             if first[a.name] == first[b.name] or not alike:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
-            between = _between(description, domains, places, both, (a.name, b.name))
+            between = _between(description, domains, places, surfaces, both, (a.name, b.name))
             if between and _same_field(description, a, b, between):
                 lead = next(name for name in first if name in both)
                 first.update(dict.fromkeys(both, lead))
@@ -104,6 +105,7 @@ def _between(
     description: Description,
     domains: tuple[Domain, ...],
     places: Mapping[tuple[tuple[str, int], ...], str],
+    surfaces: list[Surface],
     both: set[str],
     pair: tuple[str, str],
 ) -> set[str]:
@@ -117,6 +119,9 @@ def _between(
         beyond = places.get(tuple({**domain.signs, surface: -domain.signs[surface]}.items()))
         on = places.get(tuple({**domain.signs, surface: 0}.items()))
         ends = surface in description.resets or on is not None
+        if beyond is None and domain.signs[surface] and 0 in domain.signs.values():
+            # what slides, and has no region there, leaves its surfaces
+            ends = ends or is_possible(surfaces, {**domain.signs, surface: -domain.signs[surface]})
         if (ends or beyond not in (None, *both)) and len({d.signs[surface] for d in own}) > 1:
             return set()
         if {domain.mode, beyond} == set(pair):

@@ -228,7 +228,7 @@ class TransitionMaps(SectionMaps):
         behind = led(behind, reset.leads, domain.own_mode)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
-        return tuple(d.name for d in (*behind, *resting))
+        return tuple(dict.fromkeys(d.name for d in (*behind, *resting)))
 
     def _departed(self, asked: Mapping[str, int]) -> list[Domain]:
         """Return the domains in which motion leaves the surfaces that it slid on before a reset.
@@ -287,7 +287,7 @@ class TransitionMaps(SectionMaps):
             asked = sorted({s.name for s in self.surfaces if s.name not in free} | landed)
             found: dict[tuple[int, ...], list[Domain]] = {}
             for domain in self.domains:
-                if all(domain.signs[name] != 0 for name in free):
+                if all(domain.signs[name] != 0 for name in free if reset.lands.get(name) != 0):
                     key = tuple(domain.signs[name] for name in asked)
                     found.setdefault(key, []).append(domain)
             self._landed_on[reset.surface] = found
@@ -315,7 +315,11 @@ class TransitionMaps(SectionMaps):
                 return self.domain_at(domain.signs, entered)
             return target
         resting = self.domain_at({**domain.signs, surface.name: 0}, mode)
-        return resting if resting is not None else self.domain_at(through, mode)
+        beyond = self.domain_at(through, mode)
+        whole = beyond is not None and self.domain_by_name[beyond].own_mode == mode
+        if resting is None or (resting == domain.name and whole):
+            return beyond  # what leaves rest there goes back, what comes in one mode on both sides passes
+        return resting
 
     def _resolve_at_rest(self, signs: Mapping[str, int], mode: str) -> str | None:
         staying = self._domain_with(signs, mode)

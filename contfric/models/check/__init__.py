@@ -49,6 +49,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_constraints,
         check_kinks,
         check_names,
+        check_reset_kinks,
         check_two_folds,
     )
     from contfric.models.check.passages import check_passages
@@ -80,6 +81,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_continuity(report, probe)
     check_reset_jumps(report, probe)
     check_kinks(report, loaded)
+    check_reset_kinks(report, probe)
     check_sliding(report, probe)
     check_filippov(report, probe)
     check_two_folds(report, probe)

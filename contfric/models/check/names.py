@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
+from contfric.models.check.structure import arrivals
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
 from contfric.models.grammar import parse
 
 #: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
 _STARTS = 40
+
+#: What formulas with kinks are of numbers.
+_KINKED = {
+    "Where": lambda d, a, b: a if d > 0.0 else b,
+    "Sign": lambda x: (x > 0.0) - (x < 0.0),
+    "Abs": abs,
+}
 
 
 def check_constraints(report: ModelReport, model: Model) -> bool:
@@ -101,6 +109,39 @@ def check_kinks(report: ModelReport, model: Model) -> None:
                     "is best written outside: abs(v)/vS in place of abs(v/vS)); without it the kink "
                     "costs accuracy",
                 )
+
+
+def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
+    """Warn of kinks of resets between states that meet their surface in one mode: no event tells of them."""
+    model = probe.model
+    if not model.definition or not model.resets:
+        return
+    from sympy import Symbol, lambdify
+
+    from contfric.models.formulas import kinks_in
+    from contfric.models.symbols import Formulas
+
+    formulas = Formulas(from_text(model.definition))
+    symbols = (formulas.t, *formulas.y, *formulas.p)
+    names = dict(zip(symbols, ("t", *model.states, *model.parameter_names), strict=True))
+    order = [surface.name for surface in formulas.description.surfaces]
+    for reset in model.resets:
+        image = formulas.resets()[order.index(reset.surface)]
+        kinks = {k for value in image for k in kinks_in(value, (formulas.t, *formulas.y))}
+        met = list(arrivals(probe, reset)) if kinks else []
+        for kink in sorted(kinks, key=str):
+            report.count(Topic.KINKS)
+            value, signs = lambdify(symbols, kink, [_KINKED, "math"]), set()
+            for domain, t, y in met:
+                signs.add((domain.name, float(value(t, *y, *probe.vector)) > 0.0))
+            if len({name for name, _ in signs}) == len(signs):
+                continue
+            text = kink.subs({s: Symbol(name) for s, name in names.items()})
+            report.warn(
+                Topic.KINKS,
+                f"the reset at '{reset.surface}' has a kink where {text} = 0: multipliers jump there, and no "
+                "event says so, nor what branches off",
+            )
 
 
 def check_two_folds(report: ModelReport, probe: Probe) -> None:
