@@ -35,7 +35,7 @@ _LAST = np.ascontiguousarray(SERIES[-8:])
 #: Pairs of coefficients from the last one to twice the degree; a third of them that are compared.
 _PAIRS, _THIRD = 8.0, 1.0 / 3.0
 #: Entries of a part that waits: its ends, depth, the share of noise of the part that it is a half of, in
-#: values alone and with derivatives; 1 if the values of the part that it is a half of are resolved; then sizes.
+#: values alone and with derivatives; 1 if the values of that part are resolved; then sizes.
 LOW, HIGH, DEPTH, LIGHT, EXACT, KNOWN, SIZES = range(7)
 #: What Gauss' formula may miss of a derivative: a sum of so many numbers is rounded to that.
 _SUMMED = NODES * float(np.finfo(np.float64).eps)
