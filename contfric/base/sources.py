@@ -28,14 +28,14 @@ def package_files() -> list[Path]:
 @cache
 def _package() -> dict[str, bytes]:
     """Return the sources of the package by their names; paths as objects would take twice as long."""
-    found = {}
+    found, data = {}, str(_DATA)
     for folder, below, files in os.walk(_ROOT):
-        below[:] = [name for name in below if Path(folder, name) != _DATA]
+        below[:] = [name for name in below if os.path.join(folder, name) != data]
+        inside = folder[len(str(_ROOT)) :].replace(os.sep, "/").lstrip("/")
         for name in files:
             if name.endswith(".py"):
-                file = os.path.join(folder, name)
-                with open(file, "rb", buffering=0) as source:
-                    found[os.path.relpath(file, _ROOT).replace(os.sep, "/")] = source.read()
+                with open(os.path.join(folder, name), "rb", buffering=0) as source:
+                    found[f"{inside}/{name}" if inside else name] = source.read()
     return dict(sorted(found.items()))
 
 
@@ -59,7 +59,9 @@ def kernels_digest(folder: Path = _ROOT) -> str:
     A kernel may use any helper of the package, and those of its own folder.
     """
     every = dict(_package())
-    if folder != _ROOT and (_ROOT not in folder.parents or _DATA in folder.parents):
+    if folder != _ROOT:
+        if _ROOT in folder.parents and _DATA not in folder.parents:
+            return kernels_digest()
         every |= {f"./{file.name}": file.read_bytes() for file in sorted(folder.glob("*.py"))}
     return _digest({name: text for name, text in every.items() if _MARK in text})
 

@@ -62,14 +62,15 @@ def read_yaml(path: Path) -> LocatedYaml:
     """
     import yaml
 
-    text, loader = _text(path), _loader()
+    text = _text(path)
     try:
-        node = yaml.compose(text, Loader=loader)
+        loader = _loader()(text)  # which refuses characters that YAML does not have
+        node = loader.get_single_node()
         if node is not None and _entries(node, {}) > _MOST_ENTRIES:
             raise NotationError(
                 f"{path}:1: has more than {_MOST_ENTRIES} entries, those that its aliases repeat among them"
             )
-        data = yaml.load(text, Loader=loader)
+        data = None if node is None else loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         hint = _COLON if str(error.problem).startswith("mapping values") else ""

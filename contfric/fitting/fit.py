@@ -42,6 +42,13 @@ _NO_ORBIT = 1e6
 _DEPENDENT = 1e-9
 #: Change of the parameters, and of the sum of squares (both relative), at which a fit has converged.
 _CONVERGED = 1e-12
+#: Sums of squares at the same parameters that differ by more (relative to 1 + the sum) are of two orbits: it
+#: grows by 1 over a standard deviation of a parameter.
+_SAME = 1e-3
+_SEVERAL = (
+    "the sum of squares depends on the trial before: there are several orbits at the same parameters, as "
+    "where a contact that never slips keeps its offset"
+)
 
 
 def fit(
@@ -194,6 +201,11 @@ class _Trial(NamedTuple):
     jacobian: FloatArray
     orbits: tuple[Orbit, ...]
 
+    @property
+    def chi_square(self) -> float:
+        """The sum of squares."""
+        return float(self.residuals @ self.residuals)
+
 
 class _Problem:
     """Residuals and derivatives as functions of the free parameters; orbits are kept between trials."""
@@ -236,8 +248,11 @@ class _Problem:
             )
         except KeyboardInterrupt:
             return False, INTERRUPTED
-        self.best = None  # equal sums of squares: the last trial is the one that was accepted
-        self.solve(found.x)
+        least, self.best = self.best, None  # of equal sums of squares the last one was accepted
+        again = self.solve(found.x).chi_square
+        if abs(again - 2.0 * found.cost) > _SAME * (1.0 + again):
+            self.best = min((t for t in (least, self.best) if t), key=lambda t: t.chi_square)
+            return False, _SEVERAL
         return bool(found.success), str(found.message)
 
     def bounds(self, start: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -293,8 +308,7 @@ class _Problem:
                 parts[number] = (part[0], part[1], answer.orbit)
         residuals, slopes, orbits = zip(*(parts[k] for k in range(len(self.data))), strict=True)
         trial = _Trial(x, np.concatenate(residuals), np.concatenate(slopes), orbits)
-        sizes = [np.inf if t is None else t.residuals @ t.residuals for t in (self.best, trial)]
-        if sizes[1] < sizes[0] or self.best is None:
+        if self.best is None or trial.chi_square < self.best.chi_square:
             self.best = trial
         return trial
 

@@ -21,7 +21,7 @@ from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import differentiated
-from contfric.quantities.motion import Directions
+from contfric.quantities.motion import Directions, along_parameters
 from contfric.quantities.registry import number_quantity
 
 #: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
@@ -105,7 +105,7 @@ def by_parameters(orbit: Orbit) -> Directions:
     """
     known: Directions | None = vars(orbit).get("_by_parameters")
     if known is None:
-        known = Directions(joint_sensitivities(orbit), np.eye(len(orbit.vector)))
+        known = along_parameters(joint_sensitivities(orbit))
         vars(orbit)["_by_parameters"] = known  # as a cached property of the orbit
     return known
 
@@ -125,8 +125,8 @@ def joint_sensitivities(orbit: Orbit) -> FloatArray:
     system, vector = orbit.system, orbit.vector
     moved = np.empty((*orbit.joints.shape, len(vector)))
     right = move_joints(system.functions(), system.layout, orbit.joints, vector, moved)
-    size = 1.0 + float(np.max(np.abs(orbit.joints)))
-    if not np.max(np.abs(moved), initial=0.0) < _FOLD * size * (1.0 + right) < np.inf:
+    size = 1.0 + float(np.abs(orbit.joints).max())
+    if not np.abs(moved).max(initial=0.0) < _FOLD * size * (1.0 + right) < np.inf:
         raise ConvergenceError(
             "the orbit has no derivative by its parameters: it is at a fold or branch point, or one of a "
             "continuum. Move along the branch and ask again",
@@ -141,9 +141,12 @@ def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:
 
 def _events(orbit: Orbit) -> tuple[str, ...]:
     """Return the margins that vanish: orbits of the signature exist on one side only."""
+    vanish = np.abs(orbit.margins) < _AT_EVENT
+    if not vanish.any():
+        return ()
     tests = orbit.system.tests
     return tuple(
         f"the orbit is at an event: the {tests[k].margin.value} margin at {tests[k].surface} of segment "
         f"{tests[k].segment + 1} vanishes, and orbits of this signature exist on one side"
-        for k in np.flatnonzero(np.abs(orbit.margins) < _AT_EVENT)
+        for k in np.flatnonzero(vanish)
     )

@@ -35,8 +35,10 @@ _LAST = np.ascontiguousarray(SERIES[-8:])
 #: Pairs of coefficients from the last one to twice the degree; a third of them that are compared.
 _PAIRS, _THIRD = 8.0, 1.0 / 3.0
 #: Entries of a part that waits: its ends, depth, the share of noise of the part that it is a half of, in
-#: values alone and with derivatives; then sizes.
-LOW, HIGH, DEPTH, LIGHT, EXACT, SIZES = range(6)
+#: values alone and with derivatives; 1 if the values of that part are resolved; then sizes.
+LOW, HIGH, DEPTH, LIGHT, EXACT, KNOWN, SIZES = range(7)
+#: What Gauss' formula may miss of a derivative: a sum of so many numbers is rounded to that.
+_SUMMED = NODES * float(np.finfo(np.float64).eps)
 
 
 class Chain(NamedTuple):
@@ -281,8 +283,9 @@ def resolved(data, waiting, before, level):  # type: ignore[no-untyped-def]
     ``before`` is where what was left over of the whole stands, of which it is a half.
     """
     left, missed = noise_of(data, waiting[SIZES:])
+    rounding = ROUNDING if before == LIGHT else _SUMMED
     noise = waiting[DEPTH] >= HALVED and FALLS * waiting[before] < left < NOISE
-    return left, left <= level or noise or (left < NOISE and missed < ROUNDING)
+    return left, left <= level or noise or (left < NOISE and missed < rounding)
 
 
 @helper

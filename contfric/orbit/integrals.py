@@ -30,6 +30,7 @@ from contfric.orbit.integral_parts import (
     DEPTH,
     EXACT,
     HIGH,
+    KNOWN,
     LIGHT,
     LOW,
     SIZES,
@@ -56,12 +57,12 @@ def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
     """Write the integral over a segment, and its gradient; False if it is left to others.
 
     The values alone, which cost a fraction of the derivatives, say first which parts there are. Those of the
-    whole segment are known.
+    whole segment are known. Where they are resolved, those of both halves are.
     """
     waiting, row, data = own.waiting, own.row, own.data
     row[:, :] = 0.0
     waiting[0, LOW], waiting[0, HIGH], waiting[0, DEPTH] = 0, 1, 0
-    waiting[0, LIGHT], waiting[0, EXACT] = np.inf, np.inf
+    waiting[0, LIGHT], waiting[0, EXACT], waiting[0, KNOWN] = np.inf, np.inf, 0
     for j in range(data.shape[0]):
         waiting[0, SIZES + j] = own.least[j]
     count = 1
@@ -70,15 +71,18 @@ def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
         count -= 1
         low, high, depth = waiting[count, LOW], waiting[count, HIGH], waiting[count, DEPTH]
         light = own.values_only if depth > 0 else whole
-        if depth > 0 and not sample_part(course, low, high, own, own.light, light):
-            return False
-        left, fine = resolved(light, waiting[count], LIGHT, level)
-        with_slopes = np.inf
+        left, fine = waiting[count, LIGHT], waiting[count, KNOWN] == 1
+        if not fine:
+            if depth > 0 and not sample_part(course, low, high, own, own.light, light):
+                return False
+            left, fine = resolved(light, waiting[count], LIGHT, level)
+        known, with_slopes = fine, np.inf
         if fine and data.shape[2] == 1:
             add_part(light, low, high, course.lasts, row)
             continue
         if fine:
-            sample_part(course, low, high, own, own.exact, data)
+            if not sample_part(course, low, high, own, own.exact, data):
+                return False
             with_slopes, fine = resolved(data, waiting[count], EXACT, level)
             if fine:
                 add_part(data, low, high, course.lasts, row)
@@ -92,6 +96,7 @@ def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
             part = waiting[count + k]
             part[LOW], part[HIGH] = (middle, high) if k == 0 else (low, middle)
             part[DEPTH], part[LIGHT], part[EXACT] = depth + 1, left, with_slopes
+            part[KNOWN] = 1 if known else 0
         count += 2
     if data.shape[2] > 1:  # the mean times how the duration moves
         for j in range(data.shape[0]):

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,6 +54,25 @@ class Directions:
     def moving(self) -> tuple[IndexArray, FloatArray]:
         """The parameters that move, and how."""
         return moving(self.vector)
+
+
+@cache
+def _each(count: int) -> tuple[IndexArray, FloatArray]:
+    """Return the numbers of so many parameters, and one direction along each."""
+    return np.arange(count), np.eye(count)
+
+
+def along_parameters(joints: FloatArray) -> Directions:
+    """Return how an orbit moves with each of its parameters.
+
+    Parameters
+    ----------
+    joints : derivatives of the joints of one turn by all parameters, shape (N, 1 + n, parameters)
+    """
+    each = _each(joints.shape[2])
+    found = Directions(joints, each[1])
+    vars(found)["moving"] = each  # they all do, and that need not be looked for
+    return found
 
 
 class Place:
@@ -241,7 +260,8 @@ class Motion:
     @cached_property
     def d_excitation(self) -> FloatArray:
         """How the period of the excitation moves, shape (D,)."""
-        every, grad = np.arange(len(self.orbit.vector)), np.empty(len(self.orbit.vector))
+        count = len(self.orbit.vector)
+        every, grad = _each(count)[0], np.empty(count)
         self.orbit.model.flow.period(self.orbit.vector, every, grad)
         return np.asarray(grad @ self.d_vector)
 

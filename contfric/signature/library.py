@@ -6,8 +6,10 @@ entry is the path of the folder, or a function that returns it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from contfric.base.resources import bundled_dir
 from contfric.base.yaml_lines import read_yaml
@@ -82,10 +84,20 @@ def _model_name(model: str | Model | None) -> str | None:
 def _entry(path: Path, key: str) -> str | None:
     """Return one entry of a file, or None: a broken file must not hide the others."""
     try:
-        value = read_yaml(path).data.get(key)
-    except NotationError:
+        found = path.stat()
+    except OSError:
         return None
+    value = _content(path, found.st_mtime_ns, found.st_size).get(key)
     return value if isinstance(value, str) else None
+
+
+@cache
+def _content(path: Path, _written: int, _size: int) -> Mapping[str, object]:
+    """Return what stands in a file of the library, empty if it is broken; read again when it changes."""
+    try:
+        return MappingProxyType(dict(read_yaml(path).data))
+    except NotationError:
+        return MappingProxyType({})
 
 
 def _files() -> Iterator[Path]:

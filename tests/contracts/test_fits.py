@@ -168,6 +168,20 @@ def test_a_fit_goes_on_from_its_folder(
     assert same(fitted()[0], found)
 
 
+def test_orbits_that_depend_on_the_way_are_no_fit() -> None:
+    """The strongest spring of iwan never slips, and keeps the offset that earlier trials gave it."""
+    orbits = {w: cf.find_orbit("iwan", {"W": w}) for w in (0.98, 1.0, 1.02)}
+    data = [
+        cf.Measured("rms(x)", float(orbit.quantity("rms(x)")), 0.01, {"W": w})
+        for w, orbit in orbits.items()
+    ]
+    told: list[str] = []
+    found = cf.fit("iwan", data, {"F": 0.41}, ["F"], progress=told.append)
+    sums = [float(text.split("chi^2 = ")[1].split()[0]) for text in told]
+    assert not found.converged and "depends on the trial before" in found.message
+    assert found.chi_square == pytest.approx(min(sums), rel=1e-5)  # the best trial is kept
+
+
 def test_a_folder_of_parts_that_cannot_be_used(data: list[Any], tmp_path: Path) -> None:
     (tmp_path / "parts").write_text("something else")
     asked = (data[:1], {"S": 0.31, "S0": 0.42}, ["S"])
