@@ -62,6 +62,7 @@ class Tracer(Strand):
         self.until = until
         self.last: Box | Vector | None = None
         self.count, self.ended, self.length = 0, "", math.inf
+        self._known: tuple[int, Vector | None] = (-1, None)  # number of a point, and its orbit
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
@@ -95,7 +96,7 @@ class Tracer(Strand):
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
         plane = [b - a for a, b in zip(*printed, strict=True)]
-        exact = [solved(self.segments, self.build, point, plane) for point in printed]
+        exact = [self._exact(k, printed[0], plane), self._exact(k + 1, printed[1], plane)]
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
@@ -133,7 +134,13 @@ class Tracer(Strand):
         """Return the orbit halfway between two others."""
         plane = [b - a for a, b in zip(first, last, strict=True)]
         middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
-        return solved(self.segments, self.build, middle, plane)
+        return solved(self.segments, self.build, self.plain, middle, plane)
+
+    def _exact(self, k: int, printed: Vector, plane: Vector) -> Vector | None:
+        """Return the orbit next to a printed point, which two steps of the branch share."""
+        if self._known[0] != k or self._known[1] is None:
+            self._known = k, solved(self.segments, self.build, self.plain, printed, plane)
+        return self._known[1]
 
     def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
         """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
@@ -189,7 +196,7 @@ class Tracer(Strand):
         folds = 0 if box.monotone else self._count(box, 1, points, tangential)
         flips = 0 if box.no_flip else self._count(box, -1, points, tangential)
         ends = (float(values[0].mid()), float(values[1].mid()))
-        off = has_no_pair(self.segments, self.build, self.closes, box)
+        off = has_no_pair(self.segments, self.plain, self.closes, box)
         tori = 0 if off else UNKNOWN
         knots = self.printed(box.first), self.printed(box.last)
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
@@ -207,10 +214,10 @@ class Tracer(Strand):
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
-        for end, known in zip((box.first, box.last), points, strict=True):
+        for last, known in enumerate(points):
             if known and tangential:
                 continue
-            at = known or section(self.segments, self.build, box, end)
+            at = known or section(self.segments, self.plain, box, bool(last))
             if at is None:
                 return UNKNOWN
             _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
@@ -227,7 +234,7 @@ class Tracer(Strand):
         if before is None:
             return piece
         if isinstance(before, Box):
-            return replace(piece, linked=are_linked(self.segments, self.build, before, box))
+            return replace(piece, linked=are_linked(self.segments, self.plain, before, box))
         return replace(piece, linked=box.holds(before))
 
     def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
@@ -242,7 +249,7 @@ class Tracer(Strand):
 
     def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
         """Return whether all solutions (z, p) in some balls obey every inequality of a system."""
-        model = replace(self.build(x[-1]), slopes=None)
+        model = self.plain(x[-1])
         chain, closing = Chain(segments, model), closing_of(segments, model, system.half)
         for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
             if not inequality.finding.proved:
