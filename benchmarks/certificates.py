@@ -121,6 +121,7 @@ def models(count: int) -> None:
             found[what] += 1
             if not certificate.proved:
                 print(f"{path.stem}: {params} {orbit.name}: {certificate.why}", flush=True)
+        print(f"{path.stem}: {dict(found)} so far", flush=True)
     for what, number in found.most_common():
         print(f"{number:6d}  {what}")
     for name, why in offered.items():

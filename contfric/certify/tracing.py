@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from flint import arb, arb_mat
@@ -14,7 +14,7 @@ from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import has_no_pair
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
-from contfric.certify.inequalities import inequalities
+from contfric.certify.inequalities import Inequality, inequalities
 from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
 from contfric.certify.passing import passes_once
 from contfric.certify.piece import UNKNOWN, Piece
@@ -31,6 +31,8 @@ HALVINGS = 12
 #: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
 #: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
 _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
+#: Most parts of a box in which its inequalities are looked at.
+_PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 #: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
@@ -154,7 +156,7 @@ class Tracer(Strand):
                 return halves
         self.count += 1
         box = box_between(self.segments, self.build, first, last)
-        admissible = NO_BOX if box is None else self.obeys(self.system, self.segments, box.all)
+        admissible = NO_BOX if box is None else self.admissible(box)
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
         piece = None
         if box is not None and (admissible.proved or not splits or refuted):
@@ -247,11 +249,34 @@ class Tracer(Strand):
             *self.cover(point, last, (between, arcs[1]), level + 1),
         ]
 
+    def admissible(self, box: Box) -> Finding:
+        """Return whether all orbits of a box obey every inequality: of all at once, or part by part.
+
+        Balls of all of its orbits are as wide as it is long, which a short segment feels first.
+        """
+        whole = self._failing(self.system, self.segments, box.all)
+        if not whole:
+            return all_of([])
+        count, at = 1, {found.segment for found in whole}
+        undecided = all(found.finding.verdict is Verdict.UNDECIDED for found in whole)
+        while undecided and count < _PARTS:
+            count *= 4
+            parts = (box.part(k, count) for k in range(count))
+            if not any(self._failing(self.system, self.segments, part, at) for part in parts):
+                return all_of([])
+        return whole[0].named(self.system)
+
     def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
         """Return whether all solutions (z, p) in some balls obey every inequality of a system."""
+        found = self._failing(system, segments, x)
+        return found[0].named(system) if found else all_of([])
+
+    def _failing(
+        self, system: System, segments: Segments, x: Vector, at: Collection[int] | None = None
+    ) -> list[Inequality]:
+        """Return the inequalities that are not proved for all solutions in some balls, of some segments."""
         model = self.plain(x[-1])
         chain, closing = Chain(segments, model), closing_of(segments, model, system.half)
-        for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
-            if not inequality.finding.proved:
-                return inequality.named(system)
-        return all_of([])
+        joints = chain.joints(x[:-1])
+        every = inequalities(chain, system, joints, closing, only=at)
+        return [found for found in every if not found.finding.proved]
