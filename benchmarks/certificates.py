@@ -1,6 +1,7 @@
 """Proofs: how many random orbits, which events and how much of a branch are proved, and what no cheat passes.
 
 python -m benchmarks.certificates orbits 1000      random scenes of coulomb: share proved, by class
+python -m benchmarks.certificates models 100       random orbits of declared models and structures, by class
 python -m benchmarks.certificates events           the events of several diagrams, by kind
 python -m benchmarks.certificates branches         the branches of Fig. 5, share of the arclength
 python -m benchmarks.certificates diagram          the whole of Fig. 5, and the check of its file
@@ -25,6 +26,7 @@ import contfric as cf
 from contfric.certify.files import certificate_data
 from contfric.certify.tube_file import tubes_of
 from contfric.errors import ContfricError
+from contfric.models.balls.build import ball_model
 from contfric.verify.file import check_text
 from tests import tube_oracle
 from tests.certificate_oracle import false_statements, mutated
@@ -67,22 +69,64 @@ def orbits(count: int) -> None:
             orbit = cf.find_orbit("coulomb", params, state=rng.normal(size=2), longest=2000)
         except ContfricError:
             continue
-        begin = time.perf_counter()
+        begin = time.process_time()
         certificate = orbit.certify()
-        proving.append(time.perf_counter() - begin)
+        proving.append(time.process_time() - begin)
         if not certificate.proved:
             found[certificate.why.split(";")[0]] += 1
             print(params, orbit.name, certificate.why)
             continue
         text = json.dumps(certificate_data(certificate))
-        begin = time.perf_counter()
+        begin = time.process_time()
         answer = check_text(text)
-        checking.append(time.perf_counter() - begin)
+        checking.append(time.process_time() - begin)
         found["proved and verified" if answer.yes else f"proved, but: {answer.why}"] += 1
     for what, number in found.most_common():
         print(f"{number:6d}  {what}")
     for name, seconds in (("prover", proving), ("checker", checking)):
         print(f"{name}: median {1e3 * np.median(seconds):.1f} ms, most {max(seconds):.3f} s")
+
+
+#: Folders of declared models: bundled ones, those of tests and of stress runs.
+MODELS = ("contfric/models/bundled", "tests/models", "benchmarks/stress/typed")
+
+
+def models(count: int) -> None:
+    """Random orbits of declared models: parameters moved by up to a fifth, from random states."""
+    rng = np.random.default_rng(20)
+    root = Path(__file__).resolve().parents[1]
+    files = sorted(path for folder in MODELS for path in (root / folder).glob("*.yaml"))
+    found: Counter[str] = Counter()
+    offered: dict[str, str] = {}
+    seconds: list[float] = []
+    for path in files:
+        try:
+            model = cf.load_model(path)
+            ball_model(model, model.defaults)
+        except ContfricError as error:
+            offered[path.stem] = str(error)
+            continue
+        offered[path.stem] = ""
+        for _ in range(max(1, count // len(files))):
+            params = {k: v * rng.uniform(0.8, 1.2) for k, v in model.defaults.items()}
+            try:
+                state = rng.normal(size=len(model.states))
+                orbit = cf.find_orbit(model, params, state=state, longest=500)
+            except ContfricError:
+                continue
+            begin = time.process_time()
+            certificate = orbit.certify()
+            seconds.append(time.process_time() - begin)
+            what = "proved" if certificate.proved else certificate.why.split(";")[0]
+            found[what] += 1
+            if not certificate.proved:
+                print(f"{path.stem}: {params} {orbit.name}: {certificate.why}", flush=True)
+        print(f"{path.stem}: {dict(found)} so far", flush=True)
+    for what, number in found.most_common():
+        print(f"{number:6d}  {what}")
+    for name, why in offered.items():
+        print(f"{name}: {why}" if why else f"{name}: offered")
+    print(f"{sum(seconds):.1f} s, median {np.median(seconds):.3f} s, most {max(seconds):.2f} s")
 
 
 def events() -> None:
@@ -243,7 +287,7 @@ def _certificates(rng: np.random.Generator) -> list[str]:
 
 if __name__ == "__main__":
     task, *counts = sys.argv[1:] or ["orbits"]
-    tasks = {"orbits": orbits, "cheats": cheats}
+    tasks = {"orbits": orbits, "cheats": cheats, "models": models}
     if task == "figures":
         figures(counts[0] if counts else ".")
     elif task in tasks:

@@ -85,6 +85,11 @@ class Bounds:
         total = total + self.half * (self.rest @ upper(d)[:, 0])
         return (np.eye(len(change)) + self.half * upper(self.turn)) @ total
 
+    def applied(self, values: Vector, s: arb) -> FloatArray:
+        """Return bounds of ``C(s) values`` at one s."""
+        found = self.inverse * column(values)
+        return upper(found - s * (self.turn * found))[:, 0]
+
     def solution(self) -> Vector | None:
         """Return balls of T, ``J T = e`` with e the last unit vector, for all s; None if none are found.
 

@@ -95,8 +95,8 @@ class BranchCertificate(Shown):
         ResultFileError
             If the file cannot be written.
         """
-        from contfric.certify.diagram_certificate import UNCHECKED
-        from contfric.certify.files import checkable, write_data
+        from contfric.certify.diagram_certificate import LEFT_OUT, UNCHECKED
+        from contfric.certify.files import checkable, checked, write_data
         from contfric.certify.tube_file import tubes_of
 
         parts = [*checkable([*self.proofs, *self.points]), *tubes_of(self)]
@@ -105,6 +105,8 @@ class BranchCertificate(Shown):
                 "there is nothing to write: no proof of this branch is one that the checker knows"
             )
         data = {"certificate": "diagram", "format": 1, "checkable": parts, "unchecked": UNCHECKED}
+        reasons = [(proof.event.label, checked(proof)[1]) for proof in self.proofs if proof.proved]
+        data[LEFT_OUT] = [f"{label}: {why}" for label, why in reasons if why]
         write_data(data, path)
 
     @property

@@ -179,6 +179,16 @@ class Chain:
         assert self.model.slopes is not None
         return change[0] + arb(self.segments.turn) * self.model.slopes.period * change[-1]
 
+    def residual(self, x: Vector) -> Vector:
+        """Return the residuals of :meth:`linearised`."""
+        z, found = self.joints(x), list[arb]()
+        for i in range(self.segments.count):
+            end = self.move(i, z).end
+            found += [end[j, 0] - z[i + 1][1 + j] for j in range(self.n)]
+            at, row, _ = self.condition(i)
+            found.append((row * column(self.model.extended(z[at][0], z[at][1:])))[0, 0])
+        return found
+
     # ------------------------------------------------------------------ first derivatives
 
     def linearised(self, x: Vector, sigma: int = 1) -> tuple[Vector, list[Vector]]:
@@ -284,7 +294,10 @@ class Chain:
         assert model.slopes is not None
         mode = self.segments.modes[i]
         slope = model.slopes.fields[mode]
-        flow = block_exponential([model.fields[mode], slope], duration)[1]
+        if all(x.is_zero() for x in slope.entries()):  # rest, in phases
+            flow = slope
+        else:
+            flow = block_exponential([model.fields[mode], slope], duration)[1]
         start = column(model.by_parameter(joint[0], 0))
         if move.reset is not None:
             before = column(model.extended(joint[0], joint[1:]))

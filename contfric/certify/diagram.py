@@ -16,7 +16,6 @@ from typing import Any
 
 from contfric.atlas.diagram import Diagram
 from contfric.certify.branch import BranchCertificate, certify_branch
-from contfric.certify.certificate import Certificate
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -25,7 +24,7 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import EventCertificate, certify_event
-from contfric.certify.files import checkable
+from contfric.certify.files import checkable, checked
 from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
@@ -79,11 +78,12 @@ def certify_diagram(
         ended = f"the time limit of {time_limit:g} s ended the run"
     if late and ended:
         ended += f": {_parts(late, len(nodes))} not done"
-    written = {k: checkable(_parts_of(found.get(k))) for k in tasks}
+    written = {k: _written(found.get(k)) for k in tasks}
     events = [
         replace(
             _event_summary(node.bifurcation, tuple(i + 1 for i in node.branches), found.get(k)),
-            checkable=bool(written[k]),
+            checkable=bool(written[k][0]),
+            unchecked=written[k][1],
         )
         for k, node in enumerate(nodes)
     ]
@@ -100,7 +100,7 @@ def certify_diagram(
         time.time() - began,
         ended,
         (
-            *(part for parts in written.values() for part in parts),
+            *(part for parts, _ in written.values() for part in parts),
             *(tube for k in tasks for tube in _tubes(found.get(k), until)),
         ),
     )
@@ -169,11 +169,16 @@ def prove(
     return certify_event(task.what, task.parameter)
 
 
-def _parts_of(
+def _written(
     proof: BranchCertificate | EventCertificate | None,
-) -> tuple[Certificate | EventCertificate | None, ...]:
-    """Return the event, or the orbits of a branch, whose events are those of the diagram."""
-    return proof.points if isinstance(proof, BranchCertificate) else (proof,)
+) -> tuple[list[dict[str, Any]], str]:
+    """Return the event, or the orbits of a branch, as in a file; and why an event is not in it."""
+    if proof is None:
+        return [], "it was not tried"
+    if isinstance(proof, BranchCertificate):  # its events are those of the diagram
+        return checkable(proof.points), ""
+    part, why = checked(proof)
+    return ([] if part is None else [part]), why
 
 
 def _event_summary(

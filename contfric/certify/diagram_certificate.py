@@ -20,6 +20,10 @@ UNCHECKED = (
 )
 
 
+#: The entry of a file that names the events which are proved and not in it.
+LEFT_OUT = "events that are left out"
+
+
 @dataclass(frozen=True)
 class Gap:
     """Where a branch is not proved.
@@ -86,6 +90,7 @@ class EventSummary:
     radius : of the ball; None if it is not known
     why : what is not proved; empty if all is
     checkable : whether the file has a certificate of it, which ``contfric verify`` checks
+    unchecked : if it has none, why
     """
 
     label: str
@@ -96,6 +101,7 @@ class EventSummary:
     radius: float | None
     why: str
     checkable: bool = True
+    unchecked: str = ""
 
     @property
     def proved(self) -> bool:
@@ -171,7 +177,19 @@ class DiagramCertificate(Shown):
     @property
     def unchecked(self) -> tuple[str, ...]:
         """Labels of the events that are proved and that ``contfric verify`` does not check."""
-        return tuple(e.label for e in self.events if e.proved and not e.checkable)
+        return tuple(e.label for e in self._unchecked)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """The same events with their parameter, and why the file has no certificate of them."""
+        return tuple(
+            f"{e.label} at {self.parameter} = {e.printed:.12g}: {e.unchecked}"
+            for e in self._unchecked
+        )
+
+    @property
+    def _unchecked(self) -> list[EventSummary]:
+        return [e for e in self.events if e.proved and not e.checkable]
 
     def save(self, path: Any) -> None:
         """Write it as a JSON file; :func:`load_diagram_certificate` reads it.
@@ -186,7 +204,7 @@ class DiagramCertificate(Shown):
         summary = asdict(self)
         checkable = summary.pop("checkable")
         data = {"certificate": _KIND, "format": _FORMAT, "checkable": checkable}
-        data |= {"summary": summary, "unchecked": UNCHECKED}
+        data |= {"summary": summary, "unchecked": UNCHECKED, LEFT_OUT: self.left_out}
         text = json.dumps(data)
         with replacing(path_of("a certificate file", path)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
@@ -221,10 +239,7 @@ class DiagramCertificate(Shown):
         lines += [f"  undecided: {text}" for text in left[:_SHOWN]]
         if len(left) > _SHOWN:
             lines.append(f"  and {len(left) - _SHOWN} more")
-        if self.unchecked:
-            lines.append(
-                f"  proved, and not in the file for a checker: {', '.join(self.unchecked)}"
-            )
+        lines += [f"  proved, and not in the file for a checker: {text}" for text in self.left_out]
         return "\n".join(lines)
 
 

@@ -63,8 +63,8 @@ def ends_inside(edge: Edge, box: Box) -> tuple[Name, ...]:
     left = _failing(edge, box.all, loose)
     if not all(found.name.what == INSIDE for found in left):
         return ()
-    inner, outer = (box.first, box.last) if edge.forward else (box.last, box.first)
-    zeros = [section(edge.segments, edge.build, box, at) for at in (inner, outer)]
+    sides = (False, True) if edge.forward else (True, False)
+    zeros = [section(edge.segments, edge.build, box, last) for last in sides]
     if zeros[0] is None or zeros[1] is None or _failing(edge, zeros[0], ()):
         return ()
     beyond = _failing(edge, zeros[1], ())

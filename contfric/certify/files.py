@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from flint import acb, arb
 
 from contfric.base.files import replacing
+from contfric.certify.diagram_certificate import LEFT_OUT
 from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
@@ -139,26 +140,40 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
     }
 
 
-def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[dict[str, Any]]:
-    """Return those certificates that are proved and that the checker knows, as plain data.
+def checked(proof: Certificate | EventCertificate) -> tuple[dict[str, Any] | None, str]:
+    """Return what is proved as plain data for a file; or None, and why a file cannot have it.
 
     An event that the checker does not verify is left out: where two happen at once (an SS at which a
     multiplier is -1, too) a file of one would be refused with all that stands next to it.
     """
     from contfric.certify.certificate import Certificate
 
-    found = []
-    for proof in proofs:
-        if proof is None or not proof.proved:
-            continue
-        try:
-            data = certificate_data if isinstance(proof, Certificate) else event_data
-            part = data(proof)  # type: ignore[arg-type] # each has its own
-        except ParameterError:  # none of those that it knows
-            continue
-        if part["certificate"] != "event" or check_text(json.dumps(part)).yes:
-            found.append(part)
-    return found
+    if not proof.proved:
+        return None, "it is not proved"
+    try:
+        data = certificate_data if isinstance(proof, Certificate) else event_data
+        part = data(proof)  # type: ignore[arg-type] # each has its own
+    except ParameterError as error:  # none of those that the checker knows
+        return None, str(error)
+    answer = check_text(json.dumps(part)) if part["certificate"] == "event" else None
+    if answer is not None and not answer.yes:
+        return None, f"the checker refuses it: {answer.why}"
+    return part, ""
+
+
+def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[dict[str, Any]]:
+    """Return those certificates that are proved and that the checker knows, as plain data."""
+    found = [checked(proof)[0] for proof in proofs if proof is not None]
+    return [part for part in found if part is not None]
+
+
+def left_out(path: Any) -> list[str]:
+    """Return the events that a file does not have although they are proved, each with the reason.
+
+    Older files do not say.
+    """
+    data = json.loads(path_of("a certificate file", path).read_text(encoding="utf-8"))
+    return [str(text) for text in data.get(LEFT_OUT, ())]
 
 
 def _printed(x: arb) -> str:

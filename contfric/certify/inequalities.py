@@ -86,6 +86,7 @@ def inequalities(
     closing: Closing,
     touch: Touch | None = None,
     loose: Collection[Name] = (),
+    only: Collection[int] | None = None,
 ) -> Iterator[Inequality]:
     """Return all inequalities of a chain, joint by joint.
 
@@ -95,11 +96,12 @@ def inequalities(
     closing : how rows at the last joint read at the first one
     touch : the inequality that does not hold strictly, of an orbit at an event
     loose : inequalities at joints that are known to hold, of the others that are returned
+    only : segments whose inside is looked at; all if it is not given
     """
     model, segments = chain.model, chain.segments
     known = zeros_at_joints(segments, model, closing, _met(touch, segments.modes, model))
     surfaces = [s.name for s in system.model.surfaces]
-    for i in range(segments.count):
+    for i in range(segments.count) if only is None else sorted(only):
         move = chain.move(i, joints)
         duration = joints[i + 1][0] - joints[i][0]
         if not duration > 0:

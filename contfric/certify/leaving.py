@@ -125,7 +125,7 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
     inner, end = (first, last) if forward else (last, first)
     plane = [b - a for a, b in zip(inner, end, strict=True)]
     beyond = [(b + _BEYOND * c).mid() for b, c in zip(end, plane, strict=True)]
-    outer = solved(segments, build, beyond, plane)
+    outer = solved(segments, build, tracer.plain, beyond, plane)
     if outer is None:
         return None
     tracer.count += 1
@@ -151,7 +151,8 @@ def join(
     wanted = WITHIN if shares[0] > 0 else -WITHIN
     one, other, value = flip.split.at(arb(wanted * float(flip.split.reach)))
     guess = [*flip.turns.joined(one, other), value]
-    point = solved(tracer.segments, tracer.build, [c.mid() for c in guess], flip.plane)
+    middle = [c.mid() for c in guess]
+    point = solved(tracer.segments, tracer.build, tracer.plain, middle, flip.plane)
     zero = None if point is None else orbit_in(tracer.segments, tracer.build, point, flip.plane)
     if point is None or zero is None or not flip.split.holds(*flip.turns.of(zero[:-1]), zero[-1]):
         return tracer.cover(first, last, arcs, 0)

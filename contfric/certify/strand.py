@@ -56,6 +56,12 @@ class Strand:
     def _build(self, value: arb) -> BallModel:
         return in_phases(self._model(value))
 
+    def plain(self, value: arb) -> BallModel:
+        """Return the model without derivatives by the parameter."""
+        branch = self.branch
+        found = ball_model(branch.model, self.orbit.params, self.parameter, value, slopes=False)
+        return in_phases(found)
+
     def point(self, orbit: Orbit) -> Vector:
         """Return joints (phase and state) and parameter of an orbit of the branch's chain, exact numbers."""
         if self.whole:

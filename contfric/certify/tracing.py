@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from flint import arb, arb_mat
@@ -14,7 +14,7 @@ from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import has_no_pair
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
-from contfric.certify.inequalities import inequalities
+from contfric.certify.inequalities import Inequality, inequalities
 from contfric.certify.leaving import WITHIN, Flip, flip_at, join, leave
 from contfric.certify.passing import passes_once
 from contfric.certify.piece import UNKNOWN, Piece
@@ -31,6 +31,8 @@ HALVINGS = 12
 #: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
 #: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
 _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
+#: Most parts of a box in which its inequalities are looked at.
+_PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
 #: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
@@ -62,6 +64,7 @@ class Tracer(Strand):
         self.until = until
         self.last: Box | Vector | None = None
         self.count, self.ended, self.length = 0, "", math.inf
+        self._known: tuple[int, Vector | None] = (-1, None)  # number of a point, and its orbit
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
@@ -95,7 +98,7 @@ class Tracer(Strand):
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
         plane = [b - a for a, b in zip(*printed, strict=True)]
-        exact = [solved(self.segments, self.build, point, plane) for point in printed]
+        exact = [self._exact(k, printed[0], plane), self._exact(k + 1, printed[1], plane)]
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
@@ -133,7 +136,13 @@ class Tracer(Strand):
         """Return the orbit halfway between two others."""
         plane = [b - a for a, b in zip(first, last, strict=True)]
         middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
-        return solved(self.segments, self.build, middle, plane)
+        return solved(self.segments, self.build, self.plain, middle, plane)
+
+    def _exact(self, k: int, printed: Vector, plane: Vector) -> Vector | None:
+        """Return the orbit next to a printed point, which two steps of the branch share."""
+        if self._known[0] != k or self._known[1] is None:
+            self._known = k, solved(self.segments, self.build, self.plain, printed, plane)
+        return self._known[1]
 
     def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
         """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
@@ -147,7 +156,7 @@ class Tracer(Strand):
                 return halves
         self.count += 1
         box = box_between(self.segments, self.build, first, last)
-        admissible = NO_BOX if box is None else self.obeys(self.system, self.segments, box.all)
+        admissible = NO_BOX if box is None else self.admissible(box)
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
         piece = None
         if box is not None and (admissible.proved or not splits or refuted):
@@ -189,7 +198,7 @@ class Tracer(Strand):
         folds = 0 if box.monotone else self._count(box, 1, points, tangential)
         flips = 0 if box.no_flip else self._count(box, -1, points, tangential)
         ends = (float(values[0].mid()), float(values[1].mid()))
-        off = has_no_pair(self.segments, self.build, self.closes, box)
+        off = has_no_pair(self.segments, self.plain, self.closes, box)
         tori = 0 if off else UNKNOWN
         knots = self.printed(box.first), self.printed(box.last)
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
@@ -207,10 +216,10 @@ class Tracer(Strand):
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
-        for end, known in zip((box.first, box.last), points, strict=True):
+        for last, known in enumerate(points):
             if known and tangential:
                 continue
-            at = known or section(self.segments, self.build, box, end)
+            at = known or section(self.segments, self.plain, box, bool(last))
             if at is None:
                 return UNKNOWN
             _, rows = Chain(self.segments, self.build(at[-1])).linearised(at[:-1], sigma)
@@ -227,7 +236,7 @@ class Tracer(Strand):
         if before is None:
             return piece
         if isinstance(before, Box):
-            return replace(piece, linked=are_linked(self.segments, self.build, before, box))
+            return replace(piece, linked=are_linked(self.segments, self.plain, before, box))
         return replace(piece, linked=box.holds(before))
 
     def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
@@ -240,11 +249,34 @@ class Tracer(Strand):
             *self.cover(point, last, (between, arcs[1]), level + 1),
         ]
 
+    def admissible(self, box: Box) -> Finding:
+        """Return whether all orbits of a box obey every inequality: of all at once, or part by part.
+
+        Balls of all of its orbits are as wide as it is long, which a short segment feels first.
+        """
+        whole = self._failing(self.system, self.segments, box.all)
+        if not whole:
+            return all_of([])
+        count, at = 1, {found.segment for found in whole}
+        undecided = all(found.finding.verdict is Verdict.UNDECIDED for found in whole)
+        while undecided and count < _PARTS:
+            count *= 4
+            parts = (box.part(k, count) for k in range(count))
+            if not any(self._failing(self.system, self.segments, part, at) for part in parts):
+                return all_of([])
+        return whole[0].named(self.system)
+
     def obeys(self, system: System, segments: Segments, x: Vector) -> Finding:
         """Return whether all solutions (z, p) in some balls obey every inequality of a system."""
-        model = replace(self.build(x[-1]), slopes=None)
+        found = self._failing(system, segments, x)
+        return found[0].named(system) if found else all_of([])
+
+    def _failing(
+        self, system: System, segments: Segments, x: Vector, at: Collection[int] | None = None
+    ) -> list[Inequality]:
+        """Return the inequalities that are not proved for all solutions in some balls, of some segments."""
+        model = self.plain(x[-1])
         chain, closing = Chain(segments, model), closing_of(segments, model, system.half)
-        for inequality in inequalities(chain, system, chain.joints(x[:-1]), closing):
-            if not inequality.finding.proved:
-                return inequality.named(system)
-        return all_of([])
+        joints = chain.joints(x[:-1])
+        every = inequalities(chain, system, joints, closing, only=at)
+        return [found for found in every if not found.finding.proved]

@@ -20,6 +20,7 @@ the Jacobian with a closure of the other sign is regular, no multiplier of a tur
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ from flint import arb, arb_mat
 from contfric.certify.bounds import Bounds, regular_along, supersolution
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
-from contfric.certify.krawczyk import krawczyk
+from contfric.certify.krawczyk import approximate_inverse, krawczyk
 from contfric.certify.ray import Chord, Linear, Ray
 from contfric.certify.verdict import Verdict
 from contfric.models.balls.numbers import Vector, around, column, numbers
@@ -38,6 +39,8 @@ from contfric.models.definition import FloatArray
 OVERLAP = 0.02
 #: Half-widths of a box in units of what would suffice if it were narrow, and how often others are tried.
 _MORE, _TRIES = 1.3, 3
+#: Most steps of Newton's method, and how much smaller a correction is to be for a Jacobian to be kept.
+_NEWTON, _FAST = 10, 0.05
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
 _LEAST = 2.0**-60
 
@@ -55,6 +58,7 @@ class Box:
     tangent : balls of the direction T of the curve, over the whole box; None if none are found
     no_flip : whether no multiplier of a turn is -1 in it
     linear : the Jacobian over the box
+    bounds : what is left over of it by the preconditioner
     """
 
     first: Vector
@@ -65,6 +69,7 @@ class Box:
     tangent: Vector | None
     no_flip: bool
     linear: Linear
+    bounds: Bounds
 
     @property
     def monotone(self) -> bool:
@@ -91,28 +96,37 @@ class Box:
         return all(abs(o - s * c) < r for o, c, r in zip(off, difference, self.radii, strict=True))
 
 
-def solved(segments: Segments, build: Builder, near: Vector, plane: Vector) -> Vector | None:
+def solved(
+    segments: Segments, build: Builder, plain: Builder, near: Vector, plane: Vector
+) -> Vector | None:
     """Return the orbit in a plane through a point, by Newton's method; exact numbers, or None.
+
+    The Jacobian is computed again only where the corrections do not shrink fast.
 
     Parameters
     ----------
+    build, plain : the model with and without derivatives by the parameter
     near : point in the plane, (z, p)
     plane : its normal
     """
-    x = [c.mid() for c in near]
-    for _ in range(6):
-        residual, rows = Chain(segments, build(x[-1])).linearised(x[:-1])
+    x, inverse, last = [c.mid() for c in near], None, math.inf
+    for _ in range(_NEWTON):
+        if inverse is None:
+            residual, rows = Chain(segments, build(x[-1])).linearised(x[:-1])
+            inverse = approximate_inverse(arb_mat([*rows, plane]))
+            if inverse is None:
+                return None
+        else:
+            residual = Chain(segments, plain(x[-1])).residual(x[:-1])
         off = sum((n * (c - a) for n, c, a in zip(plane, x, near, strict=True)), arb(0))
-        matrix = arb_mat([*rows, plane]).mid()
-        try:
-            step = numbers(matrix.solve(column([*residual, off]).mid(), algorithm="approx"))
-        except ZeroDivisionError:
-            return None
+        step = numbers((inverse * column([*residual, off])).mid())
         if not all(c.is_finite() for c in step):
             return None
         x = [(c - s).mid() for c, s in zip(x, step, strict=True)]
         if all(abs(s) < _LEAST for s in step):
             return x
+        size = max(abs(float(s)) for s in step)
+        inverse, last = (inverse if size < _FAST * last else None), size
     return None
 
 
@@ -155,6 +169,7 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
                 bounds.solution(),
                 regular_along(squared(found, -1), 0.5 + OVERLAP),
                 found,
+                bounds,
             )
     return None
 
@@ -183,14 +198,24 @@ def orbit_in(segments: Segments, build: Builder, at: Vector, plane: Vector) -> V
     return found.zero if found.verdict is Verdict.PROVED else None
 
 
-def section(segments: Segments, build: Builder, box: Box, at: Vector) -> Vector | None:
-    """Return balls of the orbit of a box in the plane of its sections through a point on its chord."""
-    difference = [(b - a).mid() for a, b in zip(box.first, box.last, strict=True)]
-    zero = orbit_in(segments, build, at, difference)
-    return zero if zero is not None and box.holds(zero) else None
+def section(segments: Segments, plain: Builder, box: Box, last: bool) -> Vector | None:
+    """Return balls of the orbit of a box in the plane of its sections through its first or last point.
+
+    By C(s) there ``|X - c(s)| <= gap |X - c(s)| + |C(s) G(c(s))|``: no other Jacobian is needed.
+    """
+    s = arb(0.5 if last else -0.5)
+    middle = [((a + b) / 2).mid() for a, b in zip(box.first, box.last, strict=True)]
+    line = [m + s * (b - a).mid() for m, a, b in zip(middle, box.first, box.last, strict=True)]
+    residual = Chain(segments, plain(line[-1])).residual(line[:-1])
+    off = sum((n * (c - m) for n, c, m in zip(box.normal, line, middle, strict=True)), -s)
+    error = supersolution(box.bounds.gap, box.bounds.applied([*residual, off], s))
+    if error is None:
+        return None
+    zero = [around(c, arb(float(r))) for c, r in zip(line, error, strict=True)]
+    return zero if box.holds(zero) else None
 
 
-def are_linked(segments: Segments, build: Builder, before: Box, after: Box) -> bool:
+def are_linked(segments: Segments, plain: Builder, before: Box, after: Box) -> bool:
     """Tell whether the curve of a box goes on as that of the next one: both hold one and the same orbit."""
-    zero = section(segments, build, before, before.last)
+    zero = section(segments, plain, before, True)
     return zero is not None and after.holds(zero)

@@ -38,8 +38,6 @@ _MOST = 20_000
 #: How much longer than the last box that was decided the next one is: after some in a row, and before; and
 #: how much shorter if one is not.
 _STEADY, _GROWTH, _SLOW, _SHORTER = 8, 1.3, 1.04, 0.75
-#: How near to zeta = 1 tubes in zeta are not written: boxes shrink in proportion to the distance from there.
-_CRITICAL = 0.01
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
 #: distance from there.
 _BORN = 0.02
@@ -168,13 +166,11 @@ def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str
 def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
     branch, runs, run = proof.branch, list[_Run](), None
     size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
-    kept, zeta = _kept(branch), branch.parameter == "zeta"
+    kept = _kept(branch)
     for k, piece in enumerate(proof.pieces):
         known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
         known = known and kept[0] <= piece.start and piece.stop <= kept[1]
-        # the checker's square root of zeta^2 - 1 has no power series at 0
-        off = [abs(value - 1) for value in piece.values]
-        if not known or (zeta and min(off) < _CRITICAL):
+        if not known:
             run = None
             continue
         a, b = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)

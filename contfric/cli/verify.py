@@ -13,6 +13,7 @@ def verify(options: argparse.Namespace) -> int:
 
     need_flint()
     from contfric.certify.diagram_certificate import UNCHECKED
+    from contfric.certify.files import left_out
     from contfric.certify.files import verify as check
 
     answer = check(options.file)
@@ -20,6 +21,8 @@ def verify(options: argparse.Namespace) -> int:
         print(f"yes: {', '.join(answer.statements)} ({answer.bits} bits)")
         if any(text.endswith("open ends") for text in answer.statements):
             print(f"not checked: {UNCHECKED}")
+        for text in left_out(options.file):
+            print(f"not in the file: {text}")
         return Exit.DONE
     print(f"no: {answer.why}")
     return Exit.FAILED

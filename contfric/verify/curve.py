@@ -37,11 +37,11 @@ class Box:
         for left in range(0 if radii else self.newton, -1, -1):
             f, jacobian = self.equations(arb(0))
             self.inverse = jacobian.mid().inv().mid()
-            if left:  # a step of Newton's method
-                self.middle = (self.middle - self.inverse * f).mid()
+            if not left or max(size(f).entries(), key=float) < arb(2) ** -(9 * ctx.prec // 10):
+                break
+            self.middle = (self.middle - self.inverse * f).mid()  # a step of Newton's method
         parts = [f, self.rates(arb(0), 1), self.rates(INSIDE, 2)][: 1 if self.newton else 3]
         off = sum((HALF**k * size(self.inverse * v) for k, v in enumerate(parts)), 0 * f)
-        # an orbit's own box is narrower than those that are to hold it
         least = column([arb(2) ** -((8 if self.newton else 6) * ctx.prec // 10)] * len(f.entries()))
         self.radii = column(radii) + least if radii else size(2 * off + least)
         for _ in range(1 if radii else 4):
@@ -58,8 +58,7 @@ class Box:
         line = self.middle + arb(s) * self.along
         *z, value = (line + column([*y, 0 if self.fixed else last])).entries()
         if slope is not None:
-            pairs = zip([*z, value], slope.entries(), strict=True)
-            *z, value = (arb_series(list(pair)) for pair in pairs)
+            *z, value = (arb_series([*c]) for c in zip([*z, value], slope.entries(), strict=True))
         return Scene(self.data, value), z
 
     def moving(self) -> tuple[Scene, list[Any]]:
@@ -93,13 +92,13 @@ class Box:
         """Return which multipliers pass the circle between two orbits, once each: their rates have a sign."""
         found, (scene, z) = list[str](), self.moving()
         trace, det, along = scene.multipliers(z)
-        tests = [Scene.multipliers(*box.orbits(0))[2] for box in (self, first, last)]
         kinds, pair = ("SN", "BP" if scene.half else "PD", "NS"), part(trace * trace - 4 * det, 0)
-        for kind, moved, here, low, high in zip(kinds, along, *tests, strict=True):
-            rate, other = part(moved, 1), kind == "NS"
-            if (kind == "SN" and 0 not in part(scene.value, 1)) or (other and pair > 0):
-                continue  # the parameter is monotone, or the multipliers are real
-            if 0 in here + rate * INSIDE:
+        here = Scene.multipliers(*self.orbits(0))[2]
+        for k, kind in enumerate(kinds):
+            rate, other = part(along[k], 1), kind == "NS"
+            never = pair > 0 if other else k == 0 and 0 not in part(scene.value, 1)  # or no fold
+            if not never and 0 in here[k] + rate * INSIDE:
+                low, high = (Scene.multipliers(*box.orbits(0))[2][k] for box in (first, last))
                 if 0 in rate or 0 in low * high or (other and not pair < 0):
                     raise Undecided(f"a {kind} may be in a box")
                 found += [kind] * bool(low * high < 0)
@@ -146,13 +145,15 @@ def check_admissible(scene: Scene, z: list[arb], met: Any = (), short: bool = Fa
 
 def _inside(orbit: Any, i: int, name: str, sign: int, order: int, ends: bool, met: Any) -> None:
     """See that an observable has a sign inside of a segment, but for zeros at its ends and at a touch."""
-    (scene, z), waiting, what = orbit, [(0, 0)], f"segment {i + 1}: {name} is not met inside"
+    (scene, z), what = orbit, f"segment {i + 1}: {name} is not met inside"
+    waiting = [(2, index) for index in range(4)] if name == "v" else [(0, 0)]
     duration, touch = scene.duration(z, i).upper(), met.get((i, name))
     for level, index in waiting:  # which grows
         piece = (duration * index / 2**level).union(duration * (index + 1) / 2**level)
-        middle = arb(piece.mid())
-        _, rate, bend = (sign * c for c in scene.observed(z, i, name, piece))
-        value = sign * scene.observed(z, i, name, middle)[0] + rate * (piece - middle)
+        value, rate, bend, _ = (sign * c for c in scene.observed(z, i, name, piece.mid()))
+        off, third = piece - piece.mid(), sign * scene.observed(z, i, name, piece)[3]
+        value += (rate + (bend + third * off / 3) * off / 2) * off  # Taylor's
+        rate, bend = rate + (bend + third * off / 2) * off, bend + third * off
         if value < 0:
             raise Refused(f"false: {what}")
         starts = level > 0 == index and order > 0 and (rate, bend)[order - 1] > 0

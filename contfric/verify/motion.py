@@ -1,8 +1,8 @@
 """The solution: x'' + 2 zeta x' + x = f(t) - s S while s = sgn x' is not 0, x' = 0 while |x - f| <= S0.
 
 A slide is ``x = -s S + (x_0 + s S) C + r``, ``C = D' + 2 zeta D``, D = exp[l1, l2] a divided difference of
-exp(l tau) at the free exponents; a wave a cos(w t) adds ``Re a exp(i w t_0) exp[l1, l2, i w]`` to r.
-Nothing is divided by 0 at resonance. By its start ``dx/dx_0 = C`` and ``dx/dt_0 = -x''_0 D``.
+exp(l tau) at the zeros of P; a wave a cos(w t) adds ``Re a exp(i w t_0) exp[l1, l2, i w]`` to r, the last one
+(exp(i w tau) - C - i w D) / P(i w). Its start changes it by ``dx/dx_0 = C``, ``dx/dt_0 = -x''_0 D``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from flint import acb, acb_series, arb, arb_series
 
 #: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
 SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
-PARAMETERS, J = ("Omega", "S", "S0", "h", "zeta"), acb(0, 1)
+PARAMETERS, J, NEAR = ("Omega", "S", "S0", "h", "zeta"), acb(0, 1), 0.4  # to resonance
 _NUMBER = r"\d{1,99}([.]\d{1,99})?(e[+-]?\d{1,4})?"
 
 
@@ -40,23 +40,21 @@ def positive(value: arb, what: str) -> None:
         raise Refused(f"false: {what}") if value <= 0 else Undecided(what)
 
 
-def part(value: Any, k: int) -> arb:
+def part(value: Any, k: int) -> Any:
     """Return a coefficient of a power series; a ball is a constant."""
-    return value[k] if isinstance(value, arb_series) else arb(0 if k else value)
+    return value[k] if isinstance(value, arb_series | acb_series) else value * int(k == 0)
 
 
 def real(value: Any) -> Any:
     """Return the real part of a ball or a series."""
-    return value.real if isinstance(value, acb) else arb_series([c.real for c in value])
+    return value.real if isinstance(value, acb | arb) else arb_series([c.real for c in value])
 
 
-def sinc(x: Any) -> Any:
-    """Return sin(x) / x, also at 0: there by the derivatives of 0F1(3/2, -x^2 / 4)."""
-    if isinstance(x, acb) or 0 not in x[0]:
-        return x.sinc() if isinstance(x, acb) else x.sin() / x
-    q = -x * x / 4
-    terms = (q[0].hypgeom_0f1(1.5 + k) * (q - q[0]) ** k / (1, 1.5, 7.5)[k] for k in range(3))
-    return sum(terms, 0 * x)
+def entire(b: float, q: Any) -> Any:
+    """Return 0F1(b, q), of a series by its derivatives: cos and sinc of 2 sqrt(-q) at b = 1/2, 3/2."""
+    weights = enumerate((1, b, 2 * b * (b + 1)))
+    terms = (q[0].hypgeom_0f1(b + k) * (q - q[0]) ** k / c for k, c in weights)
+    return q.hypgeom_0f1(b) if isinstance(q, acb | arb) else sum(terms, 0 * q)
 
 
 class Scene:
@@ -70,55 +68,60 @@ class Scene:
         p = {name: ball(given) for name, given in data["params"].items()}
         self.value = p[data["parameter"]] = value
         self.omega, self.s, self.s0, h, self.zeta = (p[name] for name in PARAMETERS)
-        omega, s, s0 = (part(v, 0) for v in (self.omega, self.s, self.s0))
-        if not (omega > 0 and s >= 0 and s0 >= s):
+        if not all((part(self.omega, 0) > 0, part(self.s, 0) >= 0, part(self.s0 - self.s, 0) >= 0)):
             raise Undecided("Omega > 0, S0 >= S >= 0")
         self.waves = [(1, arb(1), self.omega), (3, h, 3 * self.omega)][: 1 if h == 0 else 2]
-        kind = acb if isinstance(self.zeta, arb) else acb_series
-        self.root = kind(self.zeta * self.zeta - 1).sqrt()
+        self.polynomial = [1 - w * w + 2 * J * self.zeta * w for _, _, w in self.waves]
+        self.square = 1 - self.zeta * self.zeta
+        self.root = (self.square if part(self.square, 0) > 0 else acb(1) * self.square).sqrt()
         self.turn, self.closing = periods * arb.pi() * (1 if self.half else 2), 1 - 2 * self.half
         self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]
         self.count = len(self.segments)
 
     def force(self, phase: Any, order: int = 0) -> Any:
-        """Return f or one of two derivatives of it by time."""
-        waves = [a * w**order * (k * phase).sin_cos()[order != 1] for k, a, w in self.waves]
-        return sum(waves[1:], waves[0]) * (-1 if order else 1)
+        """Return f or one of three derivatives of it by time."""
+        waves = [a * w**order * (k * phase).sin_cos()[order % 2 == 0] for k, a, w in self.waves]
+        return sum(waves[1:], waves[0]) * (-1 if order in (1, 2) else 1)
 
     def state(self, z: list[Any], i: int, tau: Any) -> tuple[Any, Any, Any, Any]:
         """Return x with two derivatives some time after a segment begins, and C, C', D, D' of a slide."""
-        (phase, x), (direction, _) = self.joint(z, i), self.segments[i]
+        (phase, x), (direction, _), root = self.joint(z, i), self.segments[i], self.root
         if not direction:
             return x, 0 * x, 0 * x, ()
-        angle, decay, offset = J * self.root * tau, (-self.zeta * tau).exp(), -direction * self.s
-        sine = tau * sinc(angle) if part(self.zeta, 0) == 1 else angle.sin() / (J * self.root)
-        d = decay * real(sine)
-        rate = decay * real(angle.cos()) - self.zeta * d
-        c = rate + 2 * self.zeta * d
+        decay, q, offset = (-self.zeta * tau).exp(), self.square * tau * tau, -direction * self.s
+        if abs(part(self.square, 0)) > NEAR:
+            d, rate = decay * real((root * tau).sin() / root), decay * real((root * tau).cos())
+        else:
+            d, rate = decay * tau * entire(1.5, -q / 4), decay * entire(0.5, -q / 4)
+        rate, c = rate - self.zeta * d, rate + self.zeta * d
         y, v = offset + (x - offset) * c, (offset - x) * d
-        first, last = self.root - self.zeta, -self.root - self.zeta
-        for k, amplitude, w in self.waves:
-            near = tau * ((first + J * w) * tau / 2).exp() * sinc((J * first + w) * tau / 2)
-            both, turn = (near - d) / (J * w - last), amplitude * (J * k * phase).exp()
-            y += real(turn * both)
-            v += real(turn * (last * both + near))
-        a = self.force(phase + self.omega * tau) - y - 2 * self.zeta * v + offset
-        return y, v, a, (c, -d, d, rate)
+        for (k, amplitude, w), p in zip(self.waves, self.polynomial, strict=True):
+            turn, wave = amplitude * (J * k * phase).exp(), (J * w * tau).exp()
+            if abs(part(p, 0)) > NEAR:
+                both = (wave - c - J * w * d) / p
+            else:  # without what cancels
+                half = (J * (root - w) - self.zeta) * tau / 2
+                near = tau * half.exp() * wave * entire(1.5, half * half / 4)
+                both = (near - d) / (J * (w + root) + self.zeta)
+            y, v = y + real(turn * both), v + real(turn * (J * w * both + d))
+        force = self.force(phase + self.omega * tau)
+        return y, v, force - y - 2 * self.zeta * v + offset, (c, -d, d, rate)
 
-    def observed(self, z: list[Any], i: int, name: str, tau: Any) -> tuple[Any, Any, Any]:
-        """Return v, or the load less its limit (F+, F-), with two derivatives."""
-        (y, v, a, _), end = self.state(z, i, tau), self.joint(z, i)[0] + self.omega * tau
-        first = v - self.force(end, 1)
+    def observed(self, z: list[Any], i: int, name: str, tau: Any) -> tuple[Any, Any, Any, Any]:
+        """Return v, or the load less its limit (F+, F-), with three derivatives."""
+        (y, v, a, slides), end = self.state(z, i, tau), self.joint(z, i)[0] + self.omega * tau
+        first, second = self.force(end, 1), self.force(end, 2)
+        jerk = first - v - 2 * self.zeta * a if slides else 0
         if name == "v":
-            return v, a, -first - 2 * self.zeta * a
+            return v, a, jerk, second - a - 2 * self.zeta * jerk
         load = y - self.force(end) + (-self.s0 if name == "F+" else self.s0)
-        return load, first, a - self.force(end, 2)
+        return load, v - first, a - second, jerk - self.force(end, 3)
 
     def joint(self, z: list[Any], i: int) -> tuple[Any, Any]:
         """Return joint i, the last one by periodicity or symmetry."""
-        if i < self.count:
-            return z[2 * i], z[2 * i + 1]
-        return z[0] + self.turn, self.closing * z[1]
+        return (
+            (z[2 * i], z[2 * i + 1]) if i < self.count else (z[0] + self.turn, self.closing * z[1])
+        )
 
     def duration(self, z: list[Any], i: int) -> Any:
         """Return how long segment i lasts."""
@@ -133,8 +136,8 @@ class Scene:
             return [y - x, load - side * self.s0], ((0, -1), (0, 0)), ((0, 1), (slope, 1))
         reached, v, last, (c, dc, d, dd) = self.state(z, i, tau)
         first = (self.force(phase) - x - direction * self.s) / self.omega
-        after = (v / self.omega, -1), (last / self.omega, 0)
-        return [reached - y, v], ((-first * d, c), (-first * dd, dc)), after
+        own = (-first * d, c), (-first * dd, dc)
+        return [reached - y, v], own, ((v / self.omega, -1), (last / self.omega, 0))
 
     def equations(self, z: list[Any]) -> tuple[list[Any], list[list[Any]]]:
         """Return what vanishes for a solution, and its Jacobian, two rows a segment."""

@@ -136,13 +136,13 @@ def test_what_is_no_run_folder_is_said(
     assert "pip install 'contfric[certify]'" in said
 
 
-def test_an_event_that_the_checker_refuses_is_not_in_the_file(
-    monkeypatch: pytest.MonkeyPatch,
+def test_an_event_that_the_checker_refuses_is_said_and_not_in_the_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Where two events happen at once a file of one would be refused, and all that stands next to it."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
-    (event, *_) = cf.continue_orbit(orbit, "Omega", (0.538, 0.545)).bifurcations
-    proofs = [event.certify(), orbit.certify()]
+    branch = cf.continue_orbit(orbit, "Omega", (0.538, 0.545))
+    proofs = [branch.bifurcations[0].certify(), orbit.certify()]
     assert [part["certificate"] for part in files.checkable(proofs)] == ["event", "orbit"]
     own = files.event_data
     monkeypatch.setattr(files, "event_data", lambda proof: own(proof) | {"kind": "PD"})
@@ -150,5 +150,10 @@ def test_an_event_that_the_checker_refuses_is_not_in_the_file(
     diagram = cf.explore(orbit, "Omega", (0.538, 0.545), bridges=False)
     found = diagram.certify()
     assert found.unchecked and set(found.unchecked) == {e.label for e in found.events if e.proved}
-    assert "not in the file for a checker: SN_1a" in str(found)
+    assert "not in the file for a checker: SN_1a at Omega = 0.5419" in str(found)
+    for proof in (found, branch.certify()):
+        proof.save(tmp_path / "c.json")
+        assert main(["verify", str(tmp_path / "c.json")]) == 0
+        said = capsys.readouterr().out
+        assert "not in the file: SN_1a" in said and "the checker refuses it: false" in said
     assert not proved().unchecked

@@ -120,7 +120,7 @@ def a_box(first: Vector, last: Vector) -> Box | None:
     with ctx.workprec(80):
         segments = segments_of(den_hartog().system)
         plane = [b - a for a, b in zip(first, last, strict=True)]
-        exact = [solved(segments, build, point, plane) for point in (first, last)]
+        exact = [solved(segments, build, build, point, plane) for point in (first, last)]
         assert exact[0] is not None
         assert exact[1] is not None
         return box_between(segments, build, exact[0], exact[1])

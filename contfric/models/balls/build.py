@@ -12,13 +12,18 @@ from contfric.models.definition import Model
 
 
 def ball_model(
-    model: Model, params: Mapping[str, float], free: str | None = None, value: arb | None = None
+    model: Model,
+    params: Mapping[str, float],
+    free: str | None = None,
+    value: arb | None = None,
+    slopes: bool = True,
 ) -> BallModel:
     """Return a model's matrices in balls, at parameters that are the exact binary numbers given.
 
     Parameters
     ----------
     free, value : a parameter that is free, and the ball that it is in
+    slopes : whether derivatives by the free parameter are asked for
 
     Raises
     ------
@@ -39,6 +44,7 @@ def ball_model(
     balls = {name: arb(float(number)) for name, number in params.items()}
     if free is not None and value is not None:
         balls[free] = value
+    free = free if slopes else None
     if model.ball_factory is not None:
         return model.ball_factory(balls, free)
     from contfric.models.balls.declared import declared_balls

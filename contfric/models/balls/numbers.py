@@ -75,7 +75,8 @@ def around(centre: arb, radius: arb) -> arb:
 
 def zeros(rows: int, columns: int) -> list[Vector]:
     """Return rows of zeros that can be filled."""
-    return [[arb(0) for _ in range(columns)] for _ in range(rows)]
+    zero = arb(0)  # no ball is changed in its place
+    return [[zero] * columns for _ in range(rows)]
 
 
 def row_norm(matrix: arb_mat) -> arb:
