@@ -45,11 +45,10 @@ def _complexity(candidate: Candidate) -> tuple[int, bool]:
 def goes_on(state: Exploration, event: Event) -> bool:
     """Tell whether the indices of the branches at an event have the same sum on both of its sides."""
     sums, sides = {-1: 0, 1: 0}, 0
-    unknown = event.bifurcation.accuracy * state.settings.width
     for number in event.branches:
         branch = state.branches[number]
         for first in _ends_at(branch, event):
-            index, side = _beside(branch, first, state.settings.parameter, unknown)
+            index, side = _beside(branch, first, state.settings.parameter)
             if index is None:
                 return False
             sums[side] += index
@@ -67,15 +66,12 @@ def _ends_at(branch: Branch, event: Event) -> Iterator[int]:
                 yield point
 
 
-def _beside(branch: Branch, end: int, parameter: str, unknown: float) -> tuple[int | None, int]:
-    """Return the index of the orbits of a branch next to one of its ends, and the side that they are on.
-
-    Points nearer than the event is known are on no side: where a slip shrinks to nothing that is rounding.
-    """
-    ahead = branch.params[parameter] - branch.params[parameter][end]
-    away = np.flatnonzero(np.abs(ahead) > unknown)
-    if branch.multipliers is None or not len(away):
+def _beside(branch: Branch, end: int, parameter: str) -> tuple[int | None, int]:
+    """Return the index of the orbits of a branch next to one of its ends, and the side that they are on."""
+    values, multipliers = branch.params[parameter], branch.multipliers
+    near = 1 if end == 0 else -2
+    if multipliers is None or len(values) < 2:
         return None, 1
-    near = int(away[0] if end == 0 else away[-1])
-    real = branch.multipliers[near][np.abs(branch.multipliers[near].imag) == 0.0].real
-    return (-1) ** int(np.sum(real > 1.0)), 1 if ahead[near] > 0.0 else -1
+    real = multipliers[near][np.abs(multipliers[near].imag) == 0.0].real
+    side = 1 if values[near] > values[end] else -1
+    return (-1) ** int(np.sum(real > 1.0)), side

@@ -81,7 +81,7 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    accepted = jumps = balanced = False
+    accepted = jumps = False
     orbit = event.bifurcation.orbit
     if any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests):
         state.judge(event, "go on after the event", Verdict.REFUSED, why=_INCOMPLETE)
@@ -118,7 +118,6 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
                 return
             if composes(orbit) and goes_on(state, event):
                 state.judge(event, "other orders of the changes", Verdict.REFUSED, why=GOES_ON)
-                balanced = True
                 break
             if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
                 itineraries |= candidate.itineraries
@@ -126,7 +125,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         event.kinds |= {
             n.kind for n in incident.names if n.before & itineraries and n.after & itineraries
         }
-        if accepted or balanced or follow_split(state, event):
+        if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it
         _follow_flow(state, event)

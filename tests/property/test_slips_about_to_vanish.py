@@ -1,15 +1,13 @@
-"""A contact that slips a little is not at rest in between, and its branch has a side, however little."""
+"""A contact that slips a little is not at rest in between, however little it slips."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.composed import _beside
 from contfric.continuation.events import ACCURACY
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.zero_acceleration import only_comes_back
@@ -71,19 +69,6 @@ def test_a_segment_comes_back_where_nothing_inside_is_a_minimum() -> None:
                 assert only_comes_back(orbit, i, surface) == farthest
                 told.append(farthest)
     assert told.count(True) >= 6 and told.count(False) >= 6
-
-
-@pytest.mark.parametrize("end", [0, -1])
-@pytest.mark.parametrize("side", [1, -1])
-def test_the_side_of_a_branch_is_no_rounding(end: int, side: int) -> None:
-    ahead = np.array([0.0, -3e-14, 2e-14, -1e-14, 1e-7, 1e-4])
-    multipliers = np.full((len(ahead), 2), 0.5 + 0j)
-    multipliers[1:4, 0] = 1.0 + 1e-9  # where a slip has no length these are rounding, too
-    order = slice(None) if end == 0 else slice(None, None, -1)
-    values = {"Omega": (1.0 + side * ahead)[order]}
-    branch = cast(Any, SimpleNamespace(params=values, multipliers=multipliers[order]))
-    assert _beside(branch, end, "Omega", 1e-10) == (1, side)
-    assert _beside(branch, end, "Omega", 1e-3)[0] is None  # it does not reach beyond the event
 
 
 @pytest.mark.slow
