@@ -239,7 +239,11 @@ class DiagramCertificate(Shown):
         lines += [f"  undecided: {text}" for text in left[:_SHOWN]]
         if len(left) > _SHOWN:
             lines.append(f"  and {len(left) - _SHOWN} more")
-        lines += [f"  proved, and not in the file for a checker: {text}" for text in self.left_out]
+        reasons = dict.fromkeys(e.unchecked for e in self._unchecked)
+        for why in reasons:
+            alike = [e for e in self._unchecked if e.unchecked == why]
+            named = "; ".join(f"{e.label} at {self.parameter} = {e.printed:.9g}" for e in alike)
+            lines.append(f"  proved, and not in the file for a checker: {named}: {why}")
         return "\n".join(lines)
 
 
