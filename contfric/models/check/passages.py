@@ -1,9 +1,10 @@
-"""Modes that end at a surface with a reset that acts in other modes only, where no mode is behind it."""
+"""Modes that end where nothing is behind them: at resets of other modes, and at limits that cross."""
 
 from __future__ import annotations
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
+from contfric.models.definition import Domain, Model, Reset
 
 #: States on each surface.
 _ON_SURFACE = 200
@@ -36,3 +37,22 @@ def _ending(probe: Probe, surface: str) -> str:
             if domain.signs[surface] * rate < -_STILL:
                 return domain.own_mode
     return ""
+
+
+def other_side(model: Model, reset: Reset, before: Domain) -> str:
+    """Return how to say that a reset does not act in a mode, where it acts on the other side too."""
+    side = before.signs[reset.surface]
+    acting = [d for d in model.domains if model.maps_at(d, reset.surface)]
+    others = dict.fromkeys(d.own_mode for d in acting if d.signs[reset.surface] == -side)
+    if not others or before.own_mode in others:
+        return ""
+    return (
+        f"; or, if motion passes '{reset.surface}' unchanged in '{before.own_mode}', write "
+        f"'from: [{', '.join(others)}]' to the reset"
+    )
+
+
+def crossed_limits(signs: dict[str, int]) -> str:
+    """Return the contact whose moving limits are crossed: above the upper one, and below the lower."""
+    pairs = ((s[:-1], sign) for s, sign in signs.items() if s.endswith("+"))
+    return next((name for name, sign in pairs if sign > 0 and signs.get(f"{name}-", 0) < 0), "")

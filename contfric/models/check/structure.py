@@ -6,6 +6,7 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
+from contfric.models.check.passages import crossed_limits, other_side
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import Domain, FloatArray, Mode, Model, Reset, Surface
@@ -121,12 +122,6 @@ def _behind_wall(probe: Probe, signs: dict[str, int]) -> bool:
     return False
 
 
-def _crossed_limits(signs: dict[str, int]) -> str:
-    """Return the contact whose moving limits are crossed: above the upper one, and below the lower."""
-    pairs = ((s[:-1], sign) for s, sign in signs.items() if s.endswith("+"))
-    return next((name for name, sign in pairs if sign > 0 and signs.get(f"{name}-", 0) < 0), "")
-
-
 def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> None:
     model, entered = probe.model, entered_domains(probe.model)
     for t, y in probe.on(surface.name, _ON_SURFACE):
@@ -144,7 +139,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                 continue
             report.count(Topic.TRANSITIONS)
             following = model.transitions.get((name, surface.name))
-            if following is None and (limit := _crossed_limits(signs)):
+            if following is None and (limit := crossed_limits(signs)):
                 report.warn(
                     Topic.TRANSITIONS,
                     f"the limit '{limit}+' lies below '{limit}-' at some states: a friction limit that is "
@@ -239,7 +234,7 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     signs = probe.signs(t, behind)
     where = f"after the reset at '{name}' the solution from {_place(probe, t, y)}"
     possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
-    passes = _other_side(model, reset, before)
+    passes = other_side(model, reset, before)
     fits = [
         d
         for d in possible
@@ -256,19 +251,6 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
                 f"'{observable}' around, such as v: -e*v, or lead off the surface{passes}"
             )
     return ""
-
-
-def _other_side(model: Model, reset: Reset, before: Domain) -> str:
-    """Return how to say that a reset does not act in a mode, where it acts on the other side too."""
-    side = before.signs[reset.surface]
-    acting = [d for d in model.domains if model.maps_at(d, reset.surface)]
-    others = dict.fromkeys(d.own_mode for d in acting if d.signs[reset.surface] == -side)
-    if not others or before.own_mode in others:
-        return ""
-    return (
-        f"; or, if motion passes '{reset.surface}' unchanged in '{before.own_mode}', write "
-        f"'from: [{', '.join(others)}]' to the reset"
-    )
 
 
 def check_sliding(report: ModelReport, probe: Probe) -> None:
