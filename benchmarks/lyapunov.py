@@ -24,7 +24,7 @@ import numpy as np
 from origin import origin, renewed
 
 import contfric as cf
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.two_orbits import two_orbit_estimate
 
 PAGE = Path(__file__).parents[1] / "docs" / "lyapunov.md"
@@ -113,7 +113,9 @@ def tangents(rounds: int, periods: int) -> list[str]:
             joints = len(
                 plain.time(lambda: cf.simulate(model, params, state=start[0], periods=periods))  # noqa: B023
             )
-            rows = full.time(lambda: follow(model, vector, start, 0.0, Limits(0, periods, 0.0)))  # noqa: B023
+            rows = full.time(
+                lambda: follow(model, vector, start, 0.0, FollowingLimits(0, periods, 0.0))  # noqa: B023
+            )
         assert rows.followed[0] == periods  # it is chaotic, to the end
         lines.append(
             f"| {name} | {joints / periods:.2f} | {min(plain.busy) / joints * 1e6:.2f} us "

@@ -21,7 +21,7 @@ import numpy as np
 from origin import origin, renewed
 
 import contfric as cf
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 from contfric.orbit.simulation import Trajectory, tables
 
 PAGE = Path(__file__).parents[1] / "docs" / "lyapunov.md"
@@ -93,7 +93,7 @@ def costs() -> list[str]:
         if not which.startswith("coulomb"):
             states = np.array(cf.simulate(model, params, periods=100).last[2])[None]
         motion = cf.simulate(model, params, state=states[0], periods=PERIODS)
-        joints, limits = len(motion), Limits(0, PERIODS, 0.0)
+        joints, limits = len(motion), FollowingLimits(0, PERIODS, 0.0)
         plain = least(
             lambda: cf.simulate(model, params, state=states[0], periods=PERIODS)  # noqa: B023
         )

@@ -16,7 +16,7 @@ from scenes import refusal
 
 import contfric as cf
 from contfric.orbit.solve import refine
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: Distance to an event in its parameter, and of a stop to a surface.
 NEAR, TOUCHING = 1e-10, 1e-12
@@ -28,7 +28,7 @@ FOLLOWED = 0.02
 TANGENTIAL = 1e-12
 
 
-def margin(exact: Exact, kind: str, test: Test) -> Any:
+def margin(exact: Exact, kind: str, test: EventFunction) -> Any:
     """Return one margin of an orbit in 50 digits; positive if obeyed.
 
     Raises

@@ -42,7 +42,7 @@ from condition import EPS
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 SIDE = {"F+": 1, "F-": -1}
 #: Step of the central differences: their error, of its square, is beyond the digits of a Jacobian.
@@ -184,7 +184,7 @@ def _null_vector(
     return more, [mpf(v) for v in w.tolist()]
 
 
-def _at_joint(chain: Chain, test: Test) -> Equations:
+def _at_joint(chain: Chain, test: EventFunction) -> Equations:
     side, i = SIDE[test.surface], test.segment + 1
 
     def more(z: list[Joint], p: tuple[Any, ...], _: list[Any]) -> list[Any]:
@@ -194,7 +194,7 @@ def _at_joint(chain: Chain, test: Test) -> Equations:
     return more
 
 
-def _at_exit(chain: Chain, test: Test) -> Equations:
+def _at_exit(chain: Chain, test: EventFunction) -> Equations:
     s, i = chain.modes[test.segment], test.segment + 1
 
     def more(z: list[Joint], p: tuple[Any, ...], _: list[Any]) -> list[Any]:
@@ -223,7 +223,7 @@ def touching(
 
 
 def _tangency(
-    event: cf.Bifurcation, chain: Chain, p: tuple[Any, ...], z: list[Joint], test: Test
+    event: cf.Bifurcation, chain: Chain, p: tuple[Any, ...], z: list[Joint], test: EventFunction
 ) -> tuple[Equations, list[Any]]:
     sides = (
         (SIDE[test.surface],) if test.surface in SIDE else (1, -1) if event.kind == "T" else (0,)

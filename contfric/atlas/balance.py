@@ -102,8 +102,8 @@ class IndexSum:
 def balances(diagram: Diagram) -> Iterator[Balance]:
     """Yield the sums of indices near every event that is no tangency.
 
-    Events at the two ends of a continuum are one place, and so are those whose parameters are not to be told
-    apart: all that leaves them is summed together.
+    Events at the two ends of a continuum are one location, and so are those whose parameters are not to be
+    told apart: all that leaves them is summed together.
     """
     width = diagram.range[1] - diagram.range[0]
     for number, node in enumerate(diagram.nodes):
@@ -163,7 +163,7 @@ def _ended(diagram: Diagram, node: Node, reason: EndReason) -> Orbit | None:
 def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
     """Tell whether the mass can stay at rest for ever, where it comes to rest at an event nearby.
 
-    All places in which it can are one set that attracts what is near it: its index is 1.
+    All locations in which it can are one set that attracts what is near it: its index is 1.
     """
     params = {**orbit.params, parameter: value}
     model, (time, *state) = orbit.model, orbit.cycle[0]
@@ -180,7 +180,7 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
 
 
 def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
-    """Return a node with those that have the same place, and how near to it orbits are on no side of it.
+    """Return a node with those that have the same location, and how near to it orbits are on no side of it.
 
     Those that agree to their accuracies, and those that parts of branches join to them on which there is no
     orbit on either side: continua, and parts along which the parameter changes by less than it is known to.
@@ -211,13 +211,13 @@ def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterato
     """Yield the pairs of nodes between which a branch leaves a value by no more than the slack."""
     branch = diagram.branches[i]
     continuum = is_continuum(branch)
-    places = sorted(
+    locations = sorted(
         (position, k)
         for k, node in enumerate(diagram.nodes)
         if i in node.branches and node.bifurcation.kind is not Kind.T
         for position, _ in _positions(diagram, node, branch)
     )
-    for (a, one), (b, other) in pairwise(places):
+    for (a, one), (b, other) in pairwise(locations):
         ends = (diagram.nodes[k].bifurcation.params[diagram.parameter] for k in (one, other))
         part = (*ends, *branch.values[(branch.arc >= a) & (branch.arc <= b)])
         if continuum or np.max(np.abs(np.subtract(part, value))) <= slack:
@@ -240,7 +240,7 @@ def _families(
 
 
 def _positions(diagram: Diagram, node: Node, branch: Branch) -> list[tuple[float, Bifurcation]]:
-    """Return the places along a branch at which it meets an event, and the event as the branch has it."""
+    """Return the locations along a branch at which it meets an event, and the event as the branch has it."""
     width = diagram.range[1] - diagram.range[0]
     b = node.bifurcation
     images = (b, b.mirror()) if branch.mirrored and b.orbit.model.symmetry is not None else (b,)
@@ -281,7 +281,7 @@ def _beside(
 
 
 def _solved_at(branch: Branch, arc: float) -> Orbit | None:
-    """Return the orbit at a place of a branch: solved normal to the chord, for a fold may be near."""
+    """Return the orbit at a location of a branch: solved normal to the chord, for a fold may be near."""
     arcs, values, _ = branch.nodes
     k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
     length = float(arcs[k] - arcs[k - 1])
@@ -321,9 +321,9 @@ def index_sums(diagram: Diagram) -> Iterator[IndexSum]:
     if not diagram.settings.bridges or diagram.settings.stop_at:  # branches end before events
         return
     low, high = _covered(diagram)
-    places = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})
+    locations = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})
     width = diagram.range[1] - diagram.range[0]
-    for a, b in pairwise(places):
+    for a, b in pairwise(locations):
         if b - a < _APART * width:
             continue
         for share in _SHARES:
@@ -363,7 +363,7 @@ def orbits_at(branch: Branch, value: float) -> Iterator[Orbit]:
     """Yield the orbits of a branch at a parameter value, solved there: one for each time it takes it."""
     vector = branch.vector.copy()
     vector[branch.model.index_of(branch.parameter)] = value
-    for place, guess in guesses(branch, vector, value):
+    for location, guess in guesses(branch, vector, value):
         solved = refine(guess, damped=False)
-        nearest = int(np.argmin(np.abs(branch.arc - place)))
+        nearest = int(np.argmin(np.abs(branch.arc - location)))
         yield solved if solved.converged else branch[nearest]

@@ -80,18 +80,18 @@ def collect(
     """Return the diagram, with the mirror image of every asymmetric branch."""
     computed = _with_proposals(model, computed, events, settings)
     branches: list[Branch] = []
-    place: dict[int, int] = {}
+    location: dict[int, int] = {}
     image: dict[int, int] = {}
     for i, branch in enumerate(computed):
-        place[i] = len(branches)
+        location[i] = len(branches)
         branches.append(branch)
         if not branch.symmetric and model.symmetry is not None:
             image[i] = len(branches)
             branches.append(branch.mirror())
     events = [event for event in events if not _is_relabelling_at_end(event, events, settings)]
-    nodes = [node for event in events for node in _nodes(event, place, image)]
+    nodes = [node for event in events for node in _nodes(event, location, image)]
     loose = [
-        LooseEnd(place[i], side, _not_followed(end) if end.reason in _FOLLOWED else end)
+        LooseEnd(location[i], side, _not_followed(end) if end.reason in _FOLLOWED else end)
         for i, branch in enumerate(computed)
         for side, end in enumerate(branch.ends)
         if end.reason not in FINAL and not _is_followed(events, settings, i, end)
@@ -144,16 +144,17 @@ def _with_proposals(
     model: Model, computed: list[Branch], events: list[Event], settings: Settings
 ) -> list[Branch]:
     """Return the branches with what was proposed at their bifurcations."""
-    place, count = {}, 0
+    location, count = {}, 0
     for i, branch in enumerate(computed):  # where a branch will stand among the mirror images
-        place[i] = count
+        location[i] = count
         count += 1 if branch.symmetric or model.symmetry is None else 2
     changed: dict[int, Bifurcation] = {}
     final = {id(b): event.final for event in events if event.final for b in event.members}
     for event in events:
         event.bifurcation = _best_located(event, settings)
         proposals = tuple(
-            p if p.branch is None else replace(p, branch=place[p.branch]) for p in event.proposals
+            p if p.branch is None else replace(p, branch=location[p.branch])
+            for p in event.proposals
         )
         kind = telling_kind([*event.kinds, *(member.kind for member in event.members)])
         if event.final is EndReason.REST:  # all margins of the last slides vanish at once
@@ -193,10 +194,10 @@ def _not_followed(end: End) -> End:
     return replace(end, message=f"{end}; not followed (its bifurcation says why)")
 
 
-def _nodes(event: Event, place: dict[int, int], image: dict[int, int]) -> list[Node]:
+def _nodes(event: Event, location: dict[int, int], image: dict[int, int]) -> list[Node]:
     """Return the node of an event, and its mirror image if that is another one."""
-    here = tuple(place[i] for i in event.branches)
-    there = tuple(image.get(i, place[i]) for i in event.branches)
+    here = tuple(location[i] for i in event.branches)
+    there = tuple(image.get(i, location[i]) for i in event.branches)
     if event.bifurcation.symmetric:
         return [Node(event.bifurcation, tuple(dict.fromkeys((*here, *there))))]
     if there == here:

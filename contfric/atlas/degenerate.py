@@ -31,7 +31,7 @@ _SMOOTH = frozenset({Kind.SN, Kind.BP, Kind.PD})
 
 
 def degenerate_events(diagram: Diagram) -> Iterator[str]:
-    """Yield what is degenerate, in words: two events in one place, alike or at both ends of a branch.
+    """Yield what is degenerate, in words: two events in one location, alike or at both ends of a branch.
 
     And two conditions at once.
     """
@@ -46,8 +46,8 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for branch in diagram.branches:
         if not branch.mirrored and unresolved(branch, width):
-            place = f"{branch.name} at {branch.values[0]:.10g}"
-            yield f"{place}: {parameter} changes by less along it than its ends are known to"
+            location = f"{branch.name} at {branch.values[0]:.10g}"
+            yield f"{location}: {parameter} changes by less along it than its ends are known to"
     for b in values:
         if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"

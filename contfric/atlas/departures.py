@@ -14,7 +14,13 @@ from contfric.continuation.crossing import Direction
 from contfric.continuation.events import End, EndReason, Kind, Verdict
 from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.switching import NEARER, Departure, leave_along, null_vector, overshoots
+from contfric.continuation.switching import (
+    NEARER,
+    BranchStart,
+    leave_along,
+    null_vector,
+    overshoots,
+)
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
@@ -58,7 +64,7 @@ def _departures(
     reason: EndReason,
     direction: Direction | None,
     known: Callable[[Orbit], int | None],
-) -> Iterator[tuple[Departure, float, int | None]]:
+) -> Iterator[tuple[BranchStart, float, int | None]]:
     """Yield departures with their distances, and the branch that is there if it is known."""
     active = orbit.model.index_of(settings.parameter)
     along = direction or Direction(null_vector(orbit), 0.0)

@@ -110,7 +110,7 @@ def _is_symmetric(branch: Branch) -> bool:
 
     A symmetric branch is solved on its half: this one is reached by a step off an event near its end. Near
     that end asymmetry may be the root of rounding, and an asymmetric branch may pass a symmetric orbit: two
-    places of three tell.
+    locations of three tell.
     """
     if branch.system.half or branch.model.symmetry is None:
         return False

@@ -252,7 +252,7 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     """Return a branch from an event that is known roughly, with its own end there where that is known better.
 
     Where the equations of the branch that arrives are singular at its end, those of another one need not be.
-    From a place off by the root of rounding that one begins outside of its conditions: that is seen of it
+    From a location off by the root of rounding that one begins outside of its conditions: that is seen of it
     however well the event seems to be known.
     """
     known = event.bifurcation.accuracy

@@ -12,7 +12,7 @@ from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.lines import ways_in_plane
 from contfric.atlas.matching import SAME_SOLUTION
-from contfric.atlas.several_places import opening_together
+from contfric.atlas.several_locations import opening_together
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
@@ -200,8 +200,8 @@ def leave_singular(
 ) -> Branch | None:
     """Trace away from an event at which the curve has no unique direction.
 
-    Where several places open at once leading orders tell the direction. Others lie in the plane of two null
-    vectors; those at regular angles are tried.
+    Where several locations open at once leading orders tell the direction. Others lie in the plane of two
+    null vectors; those at regular angles are tried.
     """
     branch = _leave_together(state, orbit, event, settings)
     if branch is not None:
@@ -218,7 +218,7 @@ def leave_singular(
 def _leave_together(
     state: Exploration, orbit: Orbit, event: Event, settings: Settings
 ) -> Branch | None:
-    """Trace away from an event at which several places of an orbit open at once."""
+    """Trace away from an event at which several locations of an orbit open at once."""
     for away in opening_together(orbit, orbit.model.index_of(settings.parameter)):
         branch = _leave_beside(state, orbit, away.at, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
@@ -270,7 +270,7 @@ def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -
 def _end_where_it_began(side: Side, there: Point, event: Event, settings: Settings) -> None:
     """Give a side that comes back to the event it began at its second end there.
 
-    At the event orbits of its itinerary begin: the curve is not closed, both of its ends are at one place.
+    At the event orbits of its itinerary begin: the curve is not closed, both of its ends are at one location.
     Which of them is met last is rounding where a condition vanishes there with its slope.
     """
     if side.end.reason is not EndReason.CLOSED:

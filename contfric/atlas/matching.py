@@ -164,7 +164,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
 
 
 def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
-    """Yield guesses for the orbits of a branch at a value, one for each time it takes it, with their places.
+    """Yield guesses for the orbits of a branch at a value, and their locations, one each time it takes it.
 
     By interpolation between its points and the folds between them, near which it is a parabola.
     """
@@ -177,5 +177,5 @@ def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[
             share = 1.0 - max(0.0, 1.0 - share) ** 0.5
         elif folds[k] >= 0:
             share = max(0.0, share) ** 0.5
-        place = float(arc[k] + share * (arc[k + 1] - arc[k]))
-        yield place, replace(branch.between(place), vector=vector)
+        location = float(arc[k] + share * (arc[k + 1] - arc[k]))
+        yield location, replace(branch.between(location), vector=vector)

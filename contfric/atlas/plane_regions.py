@@ -109,8 +109,8 @@ def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int6
     for part in curve.parts:
         at = (part.values - box.low) / box.widths * CELLS
         along = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(at, axis=0)), axis=1))])
-        places = np.linspace(0.0, along[-1], 2 + int(3.0 * along[-1]))
-        found.append(np.column_stack([np.interp(places, along, at[:, k]) for k in (0, 1)]))
+        locations = np.linspace(0.0, along[-1], 2 + int(3.0 * along[-1]))
+        found.append(np.column_stack([np.interp(locations, along, at[:, k]) for k in (0, 1)]))
     cells = np.clip(np.concatenate(found).astype(np.int64), 0, CELLS - 1)
     cells = np.unique(cells, axis=0)
     return cells[:, 0], cells[:, 1]
@@ -188,11 +188,11 @@ def _along(
     varies = box.names.index(section.parameter)
     fixed = 1 - varies
     value = float(section.branches[0].params[box.names[fixed]][0]) if section.branches else np.nan
-    place = int((value - box.low[fixed]) / box.widths[fixed] * CELLS)
-    if not 0 <= place < CELLS:
+    location = int((value - box.low[fixed]) / box.widths[fixed] * CELLS)
+    if not 0 <= location < CELLS:
         return []
-    line = cells[:, place] if varies == 0 else cells[place, :]
-    deep = depth[:, place] if varies == 0 else depth[place, :]
+    line = cells[:, location] if varies == 0 else cells[location, :]
+    deep = depth[:, location] if varies == 0 else depth[location, :]
     edges = np.flatnonzero(np.diff(line)) + 1
     stretches = []
     for start, stop in zip([0, *edges.tolist()], [*edges.tolist(), CELLS], strict=True):

@@ -23,7 +23,7 @@ _REASON = "the touch that the hold is pinned to becomes two, or two become one"
 
 
 def follow_split(state: Exploration, event: Event) -> bool:
-    """Follow a bridge through a place where a touch splits; return whether it goes on there."""
+    """Follow a bridge through a location where a touch splits; return whether it goes on there."""
     orbit = event.bifurcation.orbit
     if event.bifurcation.kind is not Kind.AS or not splits(orbit):
         return False

@@ -164,10 +164,13 @@ def _chosen(diagram: Diagram, most: int) -> list[int]:
     return sorted([*_spread(bridges, few), *_spread(others, most - few)])
 
 
-def _spread(places: list[int], most: int) -> list[int]:
-    if len(places) <= most:
-        return places
-    return [places[k] for k in np.unique(np.linspace(0, len(places) - 1, max(most, 0)).astype(int))]
+def _spread(locations: list[int], most: int) -> list[int]:
+    if len(locations) <= most:
+        return locations
+    return [
+        locations[k]
+        for k in np.unique(np.linspace(0, len(locations) - 1, max(most, 0)).astype(int))
+    ]
 
 
 def _restart(diagram: Diagram, i: int, step: float) -> Restart:
@@ -275,8 +278,8 @@ def _covers(known: Branch, branch: Branch) -> bool:
         return False
     # by arclength: near a vertex at which Newton fails there may be a thousand points
     length = float(branch.arc[-1])
-    places = (int(np.searchsorted(branch.arc, share * length)) for share in _INSIDE)
-    along = (branch[k] for k in places if 0 < k < len(branch) - 1)
+    locations = (int(np.searchsorted(branch.arc, share * length)) for share in _INSIDE)
+    along = (branch[k] for k in locations if 0 < k < len(branch) - 1)
     ways = along, (_inside(branch, share) for share in _INSIDE), _starts(branch)
     # most points of a period that grows without bound are at one value, where each would be compared with all
     inside = chain(*(ways[::-1] if _grows(branch) else ways))

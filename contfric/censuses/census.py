@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from contfric.censuses.asked import Findings, Mesh, Wanted
-from contfric.censuses.conditions import Fate, Walk, fates_before
-from contfric.censuses.grid import Grid, Limits
+from contfric.censuses.conditions import ClosedItinerary, Fate, fates_before
+from contfric.censuses.grid import CensusLimits, Grid
 from contfric.censuses.itineraries import canonical_pair, closed_itineraries
 from contfric.censuses.limits import NEAR_ENOUGH, limits_of
 from contfric.censuses.orbits import Catalogue
@@ -93,7 +93,7 @@ def census(
     """
     model, params = tied(model, params)
     vector = model.vector(params)
-    limits = Limits(
+    limits = CensusLimits(
         whole_number("periods", periods, least=1), whole_number("stops", stops, least=1)
     )
     whole_number("finer", finer, least=0, most=_FINEST)
@@ -126,7 +126,7 @@ class _Census:
 
     model: Model
     vector: FloatArray
-    limits: Limits
+    limits: CensusLimits
     finer: int
     most_starts: int
     seed: int
@@ -221,11 +221,11 @@ class _Census:
             self.interrupted,
         )
 
-    def _walk(self, itinerary: ReducedItinerary, periods: int) -> Walk:
+    def _walk(self, itinerary: ReducedItinerary, periods: int) -> ClosedItinerary:
         found = len(self.catalogue.orbits.get((itinerary, periods), []))
         fate = self.fates[itinerary, periods]
         if found:
             fate = Fate.FOUND
         elif fate is None:
             fate = Fate.NOT_CLOSED if itinerary in self.followed else Fate.NOT_WALKED
-        return Walk(itinerary, periods, fate, found)
+        return ClosedItinerary(itinerary, periods, fate, found)

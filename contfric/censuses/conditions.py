@@ -40,7 +40,7 @@ class Fate(str, Enum):
 
 
 @dataclass(frozen=True)
-class Walk:
+class ClosedItinerary:
     """A closed itinerary (up to rotation and mirror image) over a number of periods, and its fate."""
 
     itinerary: ReducedItinerary

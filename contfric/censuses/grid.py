@@ -41,7 +41,7 @@ _NO_LETTER = -2
 
 
 @dataclass(frozen=True)
-class Limits:
+class CensusLimits:
     """What a census asks for: the most periods and stops of an orbit."""
 
     periods: int
@@ -66,7 +66,7 @@ class Grid:
 
     section: Section
     vector: FloatArray
-    limits: Limits
+    limits: CensusLimits
     shift: FloatArray
     bits: int
     reach: float

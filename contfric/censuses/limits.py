@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contfric.censuses.grid import Limits
+from contfric.censuses.grid import CensusLimits
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import SectionSearch
 from contfric.signature.edits import show
@@ -14,7 +14,7 @@ NEAR_ENOUGH = 0.75
 
 
 def limits_of(
-    limits: Limits,
+    limits: CensusLimits,
     searches: Sequence[SectionSearch],
     catalogue: Catalogue,
     interrupted: bool,
@@ -33,7 +33,7 @@ def limits_of(
     return tuple(lines)
 
 
-def _of_section(search: SectionSearch, limits: Limits) -> list[str]:
+def _of_section(search: SectionSearch, limits: CensusLimits) -> list[str]:
     lines = [_resolution(search)]
     if search.cut:
         lines.append(

@@ -12,7 +12,7 @@ import numpy as np
 from contfric.base.extras import need_pandas
 from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
-from contfric.censuses.conditions import Fate, Walk
+from contfric.censuses.conditions import ClosedItinerary, Fate
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
 
@@ -90,7 +90,7 @@ class Census(Shown):
     periods: int
     stops: int
     orbits: tuple[Orbit, ...]
-    walks: tuple[Walk, ...]
+    walks: tuple[ClosedItinerary, ...]
     searches: tuple[SectionSearch, ...]
     limits: tuple[str, ...]
     seed: int

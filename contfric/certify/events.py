@@ -35,7 +35,7 @@ from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, row_norm, working
-from contfric.orbit.margins import Margin, Test
+from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 
 #: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.
@@ -286,7 +286,7 @@ def _of_kind(
     condition = touch.condition
     if condition.rate or condition.within or condition.departs:
         return Finding(Verdict.PROVED)
-    test = Test(Margin.JOINT, condition.segment, condition.surface)
+    test = EventFunction(Margin.JOINT, condition.segment, condition.surface)
     resting = resting_domain(location.orbit.system, test)
     if resting is None:
         proved = event.kind is Kind.CS

@@ -20,7 +20,7 @@ from contfric.models.balls.numbers import column
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.holds import Hold, Itinerary
 from contfric.orbit.itineraries import half_of
-from contfric.orbit.margins import Margin, Test
+from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import build_system
 from contfric.signature.holds import hold_at, is_hold
@@ -91,7 +91,9 @@ def location_of(event: Bifurcation) -> Location:
     raise NotLocatedError(f"events of a margin of the kind '{test.margin.value}' are not proved")
 
 
-def _released(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, tuple[Test, ...]]:
+def _released(
+    orbit: Orbit, tests: tuple[EventFunction, ...]
+) -> tuple[Orbit, tuple[EventFunction, ...]]:
     """Return an orbit at the end of its holds as one without them, and what vanishes on that one.
 
     A hold that ends on a limit of rest is released there anyway: it is a stick. One that is left without
@@ -109,10 +111,14 @@ def _released(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, tuple[Test,
             limit = system.itinerary[i - 1][1]
             vanished = test.segment == i  # the hold itself; else the stick before it
             exit_ = limit if vanished else hold_at(limit)
-            moved, (first, last) = Test(Margin.EXIT, i - 2 + vanished, limit), (i - 1, i)
+            moved, (first, last) = EventFunction(Margin.EXIT, i - 2 + vanished, limit), (i - 1, i)
         else:
             exit_ = _end_of(orbit, hold, test)
-            moved = Test(Margin.HELD, i, hold.leaves) if is_hold(exit_) else _pinned(orbit, hold)
+            moved = (
+                EventFunction(Margin.HELD, i, hold.leaves)
+                if is_hold(exit_)
+                else _pinned(orbit, hold)
+            )
             merged = hold.after_rest and not is_hold(exit_)  # one stick, which touches its limit
             first, last = i - merged, i + 2 * (test.margin is Margin.EXIT)
         if moved.segment < 0:
@@ -133,14 +139,14 @@ def _at_stop(orbit: Orbit, segment: int, surface: str) -> Condition:
     return Condition(segment, surface, departs=after)
 
 
-def _ends(test: Test, hold: Hold) -> bool:
+def _ends(test: EventFunction, hold: Hold) -> bool:
     """Tell whether a hold is no longer one where a margin vanishes."""
     if test.margin is Margin.LASTING:
         return hold.after_rest and hold.segment - test.segment in (0, 1)
     return test.segment == hold.segment and test.margin in (Margin.JOINT, Margin.EXIT)
 
 
-def _end_of(orbit: Orbit, hold: Hold, test: Test) -> str:
+def _end_of(orbit: Orbit, hold: Hold, test: EventFunction) -> str:
     """Return the exit of the rest that a hold is at the event."""
     itinerary, i = orbit.system.itinerary, hold.segment
     if test.margin is Margin.JOINT:
@@ -151,14 +157,14 @@ def _end_of(orbit: Orbit, hold: Hold, test: Test) -> str:
     raise NotLocatedError("a hold that is left without acceleration into a slide is not proved")
 
 
-def _pinned(orbit: Orbit, hold: Hold) -> Test:
+def _pinned(orbit: Orbit, hold: Hold) -> EventFunction:
     """Return the pin of a hold as a condition on the segment before it."""
     before = hold.segment - 1
     if hold.pin is not None:
-        return Test(Margin.JOINT, before, hold.pin)
+        return EventFunction(Margin.JOINT, before, hold.pin)
     if hold.after_rest:
-        return Test(Margin.INTERIOR, before, orbit.system.itinerary[before][1])
-    return Test(Margin.EXIT, before, hold.leaves)
+        return EventFunction(Margin.INTERIOR, before, orbit.system.itinerary[before][1])
+    return EventFunction(Margin.EXIT, before, hold.leaves)
 
 
 def _multiplier_orbit(event: Bifurcation) -> Orbit:
@@ -174,7 +180,7 @@ def _multiplier_orbit(event: Bifurcation) -> Orbit:
     return orbit
 
 
-def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]:
+def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, list[EventFunction]]:
     """Return an orbit without vanished segments, on its half if it is symmetric; and the tests there."""
     whole, model = orbit.as_whole(), orbit.model
     lasts = whole.ends[:, 0] - whole.cycle[:, 0]
@@ -201,7 +207,7 @@ def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]
         system = build_system(model, itinerary, whole.periods, half=half is not None)
     except (KeyError, ValueError) as error:
         raise NotLocatedError(f"no orbit is left without the vanished segments ({error})") from None
-    found: list[Test] = []
+    found: list[EventFunction] = []
     for test in tests:
         at, surface = kept.index(test.segment) if test.segment in kept else -1, test.surface
         if at < 0:
@@ -209,7 +215,7 @@ def _shortest(orbit: Orbit, tests: tuple[Test, ...]) -> tuple[Orbit, list[Test]]
         if half is not None and at >= len(half) and model.symmetry is not None:
             back = {image: name for name, image in model.symmetry.surfaces.items()}
             at, surface = at - len(half), back.get(surface, surface)
-        moved = Test(test.margin, at, surface)
+        moved = EventFunction(test.margin, at, surface)
         if moved not in found:
             found.append(moved)
     return replace(whole, system=system, joints=joints.copy()), found
@@ -241,7 +247,7 @@ def _is_symmetric(model: Model, joints: FloatArray, period: float) -> bool:
     return bool(np.max(np.abs(image - joints[n:])) < _VANISHED)
 
 
-def _tangency(orbit: Orbit, test: Test) -> Location:
+def _tangency(orbit: Orbit, test: EventFunction) -> Location:
     """Return where a surface of the test's observable is touched: inside of its segment, or at its end."""
     model = orbit.model
     names = [s.name for s in model.surfaces if test.surface in (s.name, s.observable)]

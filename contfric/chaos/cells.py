@@ -18,7 +18,7 @@ from contfric.chaos.averaging import clear, gather
 from contfric.chaos.cycle import forget, returned
 from contfric.chaos.endings import NO_MOTION, averaged, starts_at_rest, write_nothing
 from contfric.chaos.one_motion import carry_on, carry_through_reset, try_cycle, write_last
-from contfric.chaos.rows import CellRows, Limits, Starting
+from contfric.chaos.rows import CellRows, FollowingLimits, Starting
 from contfric.chaos.starting import start_mode
 from contfric.chaos.tangent import ARRIVED, seed
 from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
@@ -33,7 +33,7 @@ from contfric.orbit.trajectory import HOLD_PERIODS, TablesType
 from contfric.orbit.walls import walls_of
 
 StartingType = types.NamedTuple([indices, indices, indices], Starting)
-LimitsType = types.NamedTuple([i8, i8, f8, i8], Limits)
+LimitsType = types.NamedTuple([i8, i8, f8, i8], FollowingLimits)
 CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], CellRows)
 
 
@@ -97,10 +97,10 @@ def begin(solutions, k, cell, start, y, p, limits, workspaces):  # type: ignore[
     solutions.longest[k] = HOLD_PERIODS * period
     solutions.total[k], solutions.lowest[k], solutions.rise[k] = 0.0, 0.0, 0.0
     for j in range(y.shape[0]):
-        workspaces.walk.y[j] = y[j]
+        workspaces.transit.y[j] = y[j]
     for j in range(p.shape[0]):
         solutions.p[k, j] = p[j]
-    workspaces.walk.at_once[0], workspaces.walk.at_once[2] = 0, 0
+    workspaces.transit.at_once[0], workspaces.transit.at_once[2] = 0, 0
     seed(workspaces.frame, 0)
     forget(workspaces.memory)
     clear(workspaces.averages)
@@ -109,11 +109,11 @@ def begin(solutions, k, cell, start, y, p, limits, workspaces):  # type: ignore[
 @helper
 def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # type: ignore[no-untyped-def]
     """Follow motion k to its next joint; where it ends, write what it is and its exponents, and say so."""
-    walk, growth, averages = workspaces.walk, workspaces.growth, workspaces.averages
+    transit, growth, averages = workspaces.transit, workspaces.growth, workspaces.averages
     surfaces, p, cell = tables.observables.shape[0], solutions.p[k], solutions.cell[k]
     mode, on, t, period = solutions.mode[k], solutions.on[k], solutions.time[k], solutions.period[k]
     live = solutions.live[k]
-    if walk.at_once[1] == 0:
+    if transit.at_once[1] == 0:
         outcome, surface, following, duration, turns, t, live = carry_on(
             functions, tables, ranks, mode, on, t, p, period, live, workspaces
         )
@@ -130,16 +130,16 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
     on = surfaces_after(tables, mode, surface)
     mode, joint, cycle = following, solutions.joint[k] + 1, solutions.cycle[k] + turns
     key = mode * surfaces + surface
-    timeless = walk.at_once[1] & 1 != 0
+    timeless = transit.at_once[1] & 1 != 0
     at = mode, on, key, t
     solutions.cycle[k] = cycle
-    back = returned(workspaces.memory, key, cycle, joint, t, walk.y, period, timeless)
+    back = returned(workspaces.memory, key, cycle, joint, t, transit.y, period, timeless)
     if back[0] > 0 and try_cycle(
         functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
     ):
         return True
     if solutions.stage[k] == AVERAGING:
-        gather(averages.pending, growth, live, duration, walk.y)
+        gather(averages.pending, growth, live, duration, transit.y)
         if turns > 0 and averaged(
             averages, live, turns, cycle >= solutions.end[k], limits.tolerance, rows, cell
         ):
@@ -147,7 +147,7 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
     elif solutions.stage[k] == BEFORE and cycle >= limits.transient:
         solutions.stage[k], solutions.end[k] = AVERAGING, cycle + limits.periods
         seed(workspaces.frame, live)  # what only the transient forgot counts again
-        live = walk.y.shape[0]
+        live = transit.y.shape[0]
     solutions.mode[k], solutions.on[k], solutions.live[k], solutions.joint[k] = (
         mode,
         on,
@@ -166,12 +166,12 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
 @helper
 def begun(functions, tables, starting, time, p, y, solutions, k, cell, limits, workspaces, rows):  # type: ignore[no-untyped-def]
     """Put a cell into place k; or write what it is, if there is nothing to follow, and return False."""
-    walk, state = workspaces.walk, workspaces.state
+    transit, state = workspaces.transit, workspaces.state
     rows.turns[cell], rows.followed[cell] = 0, 0
     period = functions.period(p, state.none, state.empty)
     timeless = period <= 0.0
-    walk.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
-    workspaces.cycle.walk.at_once[1] = walk.at_once[1]
+    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
+    workspaces.cycle.transit.at_once[1] = transit.at_once[1]
     if timeless:
         period = 1.0  # periods are units of time
     mode, on = start_mode(functions, tables, starting, time, y, p, state)
@@ -181,9 +181,9 @@ def begun(functions, tables, starting, time, p, y, solutions, k, cell, limits, w
         return True
     ranks, cycle = starting.ranks, workspaces.cycle
     for j in range(y.shape[0]):
-        walk.y[j] = y[j]
+        transit.y[j] = y[j]
     if not (
-        timeless and starts_at_rest(functions, tables, ranks, time, p, walk, cycle, rows, cell)
+        timeless and starts_at_rest(functions, tables, ranks, time, p, transit, cycle, rows, cell)
     ):
         write_nothing(NO_MOTION, rows, cell)
     return False
@@ -241,13 +241,13 @@ def follow_all(  # type: ignore[no-untyped-def]
                 solutions.mode,
                 solutions.on,
                 solutions.time,
-                space.walk.y,
+                space.transit.y,
                 solutions.p,
                 solutions.longest,
-                space.walk.ahead,
-                space.walk.meets,
+                space.transit.ahead,
+                space.transit.meets,
                 space.state.after,
-                space.walk.jac,
+                space.transit.jac,
             )
         for k in range(width):
             if solutions.mode[k] == IDLE:
@@ -256,7 +256,7 @@ def follow_all(  # type: ignore[no-untyped-def]
             if go_on(functions, tables, starting.ranks, solutions, k, limits, workspaces, rows):
                 rows.followed[solutions.cell[k]] = solutions.cycle[k]
                 solutions.mode[k] = IDLE
-            space.walk.meets[k] = SINGLY
+            space.transit.meets[k] = SINGLY
 
 
 @kernel(

@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from contfric.chaos.tangent import (
     ARRIVED,
-    Walk,
+    Transit,
     behind,
     differentiate,
-    new_walk,
+    new_transit,
     orthonormalise,
     push,
     to_joint,
@@ -84,7 +84,7 @@ class Memory(NamedTuple):
 class CycleWorkspace(NamedTuple):
     """Workspace for a cycle: its own walk, its joint z, frames, and the algebra of a matrix."""
 
-    walk: Walk
+    transit: Transit
     z: FloatArray
     images: FloatArray
     frame: FloatArray
@@ -117,7 +117,7 @@ def new_cycle_workspace(n):  # type: ignore[no-untyped-def]
     """Return workspace for a cycle of n states."""
     m = n + 1
     return CycleWorkspace(
-        new_walk(n),
+        new_transit(n),
         np.empty(m),
         np.empty((m, m)),
         np.empty((n, m)),
@@ -204,34 +204,34 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
         ``cycle.images`` holds the images of the unit vectors, row by row; ``cycle.logs`` the growth
         of the frame.
     """
-    walk, z, images, frame = cycle.walk, cycle.z, cycle.images, cycle.frame
-    n = walk.y.shape[0]
-    walk.at_once[0] = 0
+    transit, z, images, frame = cycle.transit, cycle.z, cycle.images, cycle.frame
+    n = transit.y.shape[0]
+    transit.at_once[0] = 0
     t, turns, rank, lasted = z[0], 0, n, 0.0
     for i in range(n + 1):
         for j in range(n + 1):
             images[i, j] = 1.0 if i == j else 0.0
-    if walk.at_once[1] & 1 != 0:
+    if transit.at_once[1] & 1 != 0:
         images[0, 0] = 0.0
     for j in range(n):
-        walk.y[j] = z[1 + j]
+        transit.y[j] = z[1 + j]
         cycle.logs[j] = 0.0
     key = -1
     for _ in range(joints):
         outcome, surface, following, duration, more, t = to_joint(
-            functions, tables, mode, on, t, p, period, walk, workspace
+            functions, tables, mode, on, t, p, period, transit, workspace
         )
         if outcome != ARRIVED:
             return -1, rank, turns, t, lasted
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, transit, workspace.none)
         rank = min(rank, ranks[mode])
-        push(images, n + 1, rate, walk.jac, walk.grad, walk.image)
-        push(frame, rank, rate, walk.jac, walk.grad, walk.image)
+        push(images, n + 1, rate, transit.jac, transit.grad, transit.image)
+        push(frame, rank, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or walk.at_once[1] & 1 != 0:
-            behind(functions, surface, t, p, images, n + 1, walk, workspace, reset)
-            behind(functions, surface, t, p, frame, rank, walk, workspace, reset)
+        if reset or transit.at_once[1] & 1 != 0:
+            behind(functions, surface, t, p, images, n + 1, transit, workspace, reset)
+            behind(functions, surface, t, p, frame, rank, transit, workspace, reset)
         lasted += duration
         if not orthonormalise(frame, rank, cycle.growth):
             return -1, rank, turns, t, lasted
@@ -285,11 +285,11 @@ def cycle_rates(cycle, rank, time):  # type: ignore[no-untyped-def]
 @helper
 def stands_still(functions, mode, p, cycle, workspace):  # type: ignore[no-untyped-def]
     """Tell whether hardly anything moves at the joint ``cycle.z``: a solution shrinks to an equilibrium."""
-    walk, z, still = cycle.walk, cycle.z, True
-    n = walk.y.shape[0]
-    functions.flow(mode, z[0], z[1:], 0.0, p, workspace.none, walk.end, walk.jac)
+    transit, z, still = cycle.transit, cycle.z, True
+    n = transit.y.shape[0]
+    functions.flow(mode, z[0], z[1:], 0.0, p, workspace.none, transit.end, transit.jac)
     for j in range(n):
-        still = still and abs(walk.jac[j, 1 + n]) <= _SLOW * (1.0 + abs(z[1 + j]))
+        still = still and abs(transit.jac[j, 1 + n]) <= _SLOW * (1.0 + abs(z[1 + j]))
     return still
 
 
@@ -305,8 +305,8 @@ def solve_cycle(  # type: ignore[no-untyped-def]
         An estimate of the error of the largest exponent; negative if there is no such cycle, or it
         repels; ``AT_A_POINT`` if it has shrunk to one. ``cycle.rates`` holds the exponents.
     """
-    n, time = cycle.walk.y.shape[0], turns * period
-    timeless = cycle.walk.at_once[1] & 1 != 0
+    n, time = cycle.transit.y.shape[0], turns * period
+    timeless = cycle.transit.at_once[1] & 1 != 0
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):
@@ -321,7 +321,7 @@ def solve_cycle(  # type: ignore[no-untyped-def]
             time = lasted
         cycle.right[0, 0] = 0.0 if timeless else t + (done - turns) * period - cycle.z[0]
         for j in range(n):
-            cycle.right[1 + j, 0] = cycle.walk.y[j] - cycle.z[1 + j]
+            cycle.right[1 + j, 0] = cycle.transit.y[j] - cycle.z[1 + j]
         gap = 0.0
         for j in range(n + 1):
             gap = max(gap, abs(cycle.right[j, 0]) / (1.0 + abs(cycle.z[j])))
@@ -355,8 +355,8 @@ def shortest(functions, tables, ranks, mode, on, key, joints, turns, p, period, 
             functions, tables, ranks, mode, on, joints // parts, p, period, cycle, workspace
         )
         gap = abs(t + (done - turns // parts) * period - cycle.z[0])
-        for j in range(cycle.walk.y.shape[0]):
-            gap = max(gap, abs(cycle.walk.y[j] - cycle.z[1 + j]) / (1.0 + abs(cycle.z[1 + j])))
+        for j in range(cycle.transit.y.shape[0]):
+            gap = max(gap, abs(cycle.transit.y[j] - cycle.z[1 + j]) / (1.0 + abs(cycle.z[1 + j])))
         if last == key and gap <= NEAR:
             return turns // parts
     return turns

@@ -71,34 +71,34 @@ def averaged(averages, live, turns, over, tolerance, rows, cell):  # type: ignor
 
 
 @helper
-def flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows):  # type: ignore[no-untyped-def]
+def flow_spectrum(functions, rank, mode, t, p, time, transit, cycle, rows):  # type: ignore[no-untyped-def]
     """Write the multipliers of a mode's flow over some time to ``cycle.mu``."""
-    n = walk.y.shape[0]
-    functions.flow(mode, t, walk.y, time, p, rows.turns[:0], walk.end, walk.jac)
+    n = transit.y.shape[0]
+    functions.flow(mode, t, transit.y, time, p, rows.turns[:0], transit.end, transit.jac)
     for i in range(n):
         for j in range(n):
-            cycle.work[i, j] = walk.jac[i, 1 + j]
+            cycle.work[i, j] = transit.jac[i, 1 + j]
     spectrum(cycle.work[:n, :n], rank, cycle.mu, cycle.real, cycle.left, cycle.product)
 
 
 @helper
-def write_period(functions, rank, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+def write_period(functions, rank, mode, t, p, period, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write the exponents of a mode that is never left: those of its flow over one period."""
-    flow_spectrum(functions, rank, mode, t, p, period, walk, cycle, rows)
-    for k in range(walk.y.shape[0]):
+    flow_spectrum(functions, rank, mode, t, p, period, transit, cycle, rows)
+    for k in range(transit.y.shape[0]):
         size = abs(cycle.mu[k]) if k < rank else 0.0
         rows.exponents[cell, k] = math.log(size) / period if size > 0.0 else -np.inf
         rows.errors[cell, k] = 0.0
 
 
 @helper
-def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+def write_rates(functions, rank, mode, t, p, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write the exponents of an equilibrium of a mode, each from a time in which it does not vanish."""
-    for k in range(walk.y.shape[0]):
+    for k in range(transit.y.shape[0]):
         rows.exponents[cell, k], rows.errors[cell, k] = -np.inf, 0.0
     known, time = 0, 1.0
     for _ in range(_TIMES):
-        flow_spectrum(functions, rank, mode, t, p, time, walk, cycle, rows)
+        flow_spectrum(functions, rank, mode, t, p, time, transit, cycle, rows)
         while known < rank and abs(cycle.mu[known]) > _LARGE_ENOUGH * abs(cycle.mu[0]):
             rows.exponents[cell, known] = math.log(abs(cycle.mu[known])) / time
             known += 1
@@ -108,34 +108,34 @@ def write_rates(functions, rank, mode, t, p, walk, cycle, rows, cell):  # type: 
 
 
 @helper
-def refine(functions, mode, t, p, walk, cycle, rows):  # type: ignore[no-untyped-def]
-    """Move ``walk.y`` to the equilibrium of a mode near it, where there is one and no continuum."""
-    n = walk.y.shape[0]
+def refine(functions, mode, t, p, transit, cycle, rows):  # type: ignore[no-untyped-def]
+    """Move ``transit.y`` to the equilibrium of a mode near it, where there is one and no continuum."""
+    n = transit.y.shape[0]
     for _ in range(_CORRECTIONS):
-        functions.flow(mode, t, walk.y, 1.0, p, rows.turns[:0], walk.end, walk.jac)
+        functions.flow(mode, t, transit.y, 1.0, p, rows.turns[:0], transit.end, transit.jac)
         for i in range(n):
             for j in range(n):
-                cycle.left[i, j] = (1.0 if i == j else 0.0) - walk.jac[i, 1 + j]
-            cycle.right[i, 0] = walk.end[i] - walk.y[i]
+                cycle.left[i, j] = (1.0 if i == j else 0.0) - transit.jac[i, 1 + j]
+            cycle.right[i, 0] = transit.end[i] - transit.y[i]
         if not dense_solve(cycle.left[:n, :n], cycle.right[:n]):
             return
         for i in range(n):
-            if not abs(cycle.right[i, 0]) <= _NEARBY * (1.0 + abs(walk.y[i])):
+            if not abs(cycle.right[i, 0]) <= _NEARBY * (1.0 + abs(transit.y[i])):
                 return
         for i in range(n):
-            walk.y[i] += cycle.right[i, 0]
+            transit.y[i] += cycle.right[i, 0]
 
 
 @helper
-def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of the equilibrium near ``walk.y``; tell whether it attracts.
+def write_equilibrium(functions, tables, ranks, mode, t, p, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of the equilibrium near ``transit.y``; tell whether it attracts.
 
     It may lie on a surface. If the fields of two modes vanish there, but their derivatives differ, no
     matrix has its exponents, and none are written.
     """
-    n = walk.y.shape[0]
-    refine(functions, mode, t, p, walk, cycle, rows)
-    write_rates(functions, ranks[mode] + 1, mode, t, p, walk, cycle, rows, cell)
+    n = transit.y.shape[0]
+    refine(functions, mode, t, p, transit, cycle, rows)
+    write_rates(functions, ranks[mode] + 1, mode, t, p, transit, cycle, rows, cell)
     if not rows.exponents[cell, 0] <= _ATTRACTS:
         return False
     rows.motions[cell] = AT_REST
@@ -145,9 +145,9 @@ def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, c
     for other in range(ranks.shape[0]):
         if other == mode or tables.sliding[other] != 0:
             continue
-        if speed(functions, other, t, p, walk, rows) > _SLOW:
+        if speed(functions, other, t, p, transit, rows) > _SLOW:
             continue
-        write_rates(functions, ranks[other] + 1, other, t, p, walk, cycle, rows, cell)
+        write_rates(functions, ranks[other] + 1, other, t, p, transit, cycle, rows, cell)
         for k in range(n):
             apart = abs(rows.exponents[cell, k] - cycle.rates[k])
             smooth = smooth and apart <= _SAME * (1.0 + abs(cycle.rates[k]))
@@ -159,55 +159,57 @@ def write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, c
 
 
 @helper
-def speed(functions, mode, t, p, walk, rows):  # type: ignore[no-untyped-def]
+def speed(functions, mode, t, p, transit, rows):  # type: ignore[no-untyped-def]
     """Return how fast a state changes in a mode, relative to 1 + its size."""
-    n, fastest = walk.y.shape[0], 0.0
-    functions.flow(mode, t, walk.y, 0.0, p, rows.turns[:0], walk.end, walk.jac)
+    n, fastest = transit.y.shape[0], 0.0
+    functions.flow(mode, t, transit.y, 0.0, p, rows.turns[:0], transit.end, transit.jac)
     for j in range(n):
-        share = abs(walk.jac[j, 1 + n]) / (1.0 + abs(walk.y[j]))
+        share = abs(transit.jac[j, 1 + n]) / (1.0 + abs(transit.y[j]))
         fastest = share if not share <= fastest else fastest
     return fastest
 
 
 @helper
-def starts_at_rest(functions, tables, ranks, t, p, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+def starts_at_rest(functions, tables, ranks, t, p, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write the exponents of an equilibrium that a solution starts on; tell whether it is one."""
     for mode in range(ranks.shape[0]):
-        if tables.sliding[mode] == 0 and speed(functions, mode, t, p, walk, rows) == 0.0:
-            write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell)
+        if tables.sliding[mode] == 0 and speed(functions, mode, t, p, transit, rows) == 0.0:
+            write_equilibrium(functions, tables, ranks, mode, t, p, transit, cycle, rows, cell)
             rows.motions[cell] = AT_REST  # even if it repels
             return True
     return False
 
 
 @helper
-def write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+def write_quiet(functions, tables, ranks, mode, t, p, period, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a solution is that no surface cuts any more: at rest, of one period, or nothing."""
-    n, excited = walk.y.shape[0], walk.at_once[1] & 1 == 0
-    functions.flow(mode, t, walk.y, _SETTLES * period, p, rows.turns[:0], walk.image, walk.jac[:0])
+    n, excited = transit.y.shape[0], transit.at_once[1] & 1 == 0
+    functions.flow(
+        mode, t, transit.y, _SETTLES * period, p, rows.turns[:0], transit.image, transit.jac[:0]
+    )
     for j in range(n):
-        walk.y[j] = walk.image[j]
-    functions.flow(mode, t, walk.y, period, p, rows.turns[:0], walk.end, walk.jac)
+        transit.y[j] = transit.image[j]
+    functions.flow(mode, t, transit.y, period, p, rows.turns[:0], transit.end, transit.jac)
     still, large = True, False
     for j in range(n):
-        still = still and abs(walk.end[j] - walk.y[j]) <= _STILL * (1.0 + abs(walk.y[j]))
-        large = large or abs(walk.y[j]) > TOO_LARGE
+        still = still and abs(transit.end[j] - transit.y[j]) <= _STILL * (1.0 + abs(transit.y[j]))
+        large = large or abs(transit.y[j]) > TOO_LARGE
     if not still:
-        broken = math.isnan(walk.end[0])
+        broken = math.isnan(transit.end[0])
         write_nothing(UNBOUNDED if large else (BROKEN if broken else UNCUT), rows, cell)
     elif excited:
-        write_period(functions, ranks[mode], mode, t, p, period, walk, cycle, rows, cell)
+        write_period(functions, ranks[mode], mode, t, p, period, transit, cycle, rows, cell)
         rows.motions[cell], rows.turns[cell] = PERIODIC, 1
-    elif not write_equilibrium(functions, tables, ranks, mode, t, p, walk, cycle, rows, cell):
+    elif not write_equilibrium(functions, tables, ranks, mode, t, p, transit, cycle, rows, cell):
         write_nothing(UNCUT, rows, cell)
 
 
 @helper
-def write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell):  # type: ignore[no-untyped-def]
+def write_end(functions, outcome, ranks, mode, t, p, period, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a solution is that did not come to another joint."""
     if outcome == HELD:  # in an autonomous model a rank counts no shift in time
-        rank = ranks[mode] + (1 if walk.at_once[1] & 1 != 0 else 0)
-        write_period(functions, rank, mode, t, p, period, walk, cycle, rows, cell)
+        rank = ranks[mode] + (1 if transit.at_once[1] & 1 != 0 else 0)
+        write_period(functions, rank, mode, t, p, period, transit, cycle, rows, cell)
         rows.motions[cell] = AT_REST
         return
     motion = CHATTERS

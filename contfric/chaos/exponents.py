@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.shown import Shown
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, real_number, whole_number
@@ -126,7 +126,7 @@ def lyapunov_dimension(exponents: FloatArray) -> NDArray[np.float64]:
     return np.asarray(dimension, dtype=np.float64)
 
 
-def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> Limits:
+def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> FollowingLimits:
     """Return how long solutions are followed, checked.
 
     Raises
@@ -141,7 +141,7 @@ def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> L
     tolerance = real_number("tolerance", tolerance, wanted=wanted)
     if tolerance < 0.0:
         raise ParameterError(f"tolerance {wanted}, got {tolerance!r}")
-    return Limits(transient, periods, tolerance, confirm)
+    return FollowingLimits(transient, periods, tolerance, confirm)
 
 
 def checked_time(time: float) -> float:

@@ -29,11 +29,11 @@ def try_cycle(  # type: ignore[no-untyped-def]
     functions, tables, ranks, at, back, p, period, rise, workspaces, rows, cell
 ):
     """Solve for the cycle that the last joint seems to be on, and write what the solution is if it is."""
-    cycle, walk, state = workspaces.cycle, workspaces.walk, workspaces.state
-    (mode, on, key, t), (joints, turns), n = at, back, walk.y.shape[0]
+    cycle, transit, state = workspaces.cycle, workspaces.transit, workspaces.state
+    (mode, on, key, t), (joints, turns), n = at, back, transit.y.shape[0]
     cycle.z[0] = t
     for j in range(n):
-        cycle.z[1 + j] = walk.y[j]
+        cycle.z[1 + j] = transit.y[j]
         for k in range(n + 1):
             cycle.frame[j, k] = workspaces.frame[j, k]
     error = solve_cycle(
@@ -41,8 +41,10 @@ def try_cycle(  # type: ignore[no-untyped-def]
     )
     if error == AT_A_POINT:
         for j in range(n):
-            cycle.walk.y[j] = cycle.z[1 + j]
-        if write_equilibrium(functions, tables, ranks, mode, t, p, cycle.walk, cycle, rows, cell):
+            cycle.transit.y[j] = cycle.z[1 + j]
+        if write_equilibrium(
+            functions, tables, ranks, mode, t, p, cycle.transit, cycle, rows, cell
+        ):
             return True
     if error < 0.0:
         doubt(workspaces.memory)
@@ -52,7 +54,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
     rows.turns[cell] = 1  # without excitation: a cycle
-    if walk.at_once[1] & 1 == 0:
+    if transit.at_once[1] & 1 == 0:
         rows.turns[cell] = shortest(
             functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
         )
@@ -68,15 +70,15 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces)
     tuple
         (outcome, surface, mode that follows, duration, periods completed, phase, directions left).
     """
-    walk, workspace = workspaces.walk, workspaces.state
+    transit, workspace = workspaces.transit, workspaces.state
     outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, workspace
+        functions, tables, mode, on, t, p, period, transit, workspace
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, transit, workspace.none)
         live = min(live, ranks[mode])
-        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
+        push(workspaces.frame, live, rate, transit.jac, transit.grad, transit.image)
         if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
@@ -85,18 +87,18 @@ def carry_on(functions, tables, ranks, mode, on, t, p, period, live, workspaces)
 @helper
 def carry_through_reset(functions, tables, ranks, mode, on, t, p, period, live, workspaces):  # type: ignore[no-untyped-def]
     """Do the same where there are resets or no excitation (apart: it would cost all others a tenth)."""
-    walk, workspace = workspaces.walk, workspaces.state
+    transit, workspace = workspaces.transit, workspaces.state
     outcome, surface, following, duration, turns, t = to_joint(
-        functions, tables, mode, on, t, p, period, walk, workspace
+        functions, tables, mode, on, t, p, period, transit, workspace
     )
     if outcome == ARRIVED:
         observable = tables.observables[surface]
-        rate = differentiate(functions, observable, mode, duration, t, p, walk, workspace.none)
+        rate = differentiate(functions, observable, mode, duration, t, p, transit, workspace.none)
         live = min(live, ranks[mode])
-        push(workspaces.frame, live, rate, walk.jac, walk.grad, walk.image)
+        push(workspaces.frame, live, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or walk.at_once[1] & 1 != 0:
-            behind(functions, surface, t, p, workspaces.frame, live, walk, workspace, reset)
+        if reset or transit.at_once[1] & 1 != 0:
+            behind(functions, surface, t, p, workspaces.frame, live, transit, workspace, reset)
         if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live
@@ -105,8 +107,8 @@ def carry_through_reset(functions, tables, ranks, mode, on, t, p, period, live, 
 @helper
 def write_last(functions, tables, outcome, ranks, mode, t, p, period, workspaces, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a solution is that meets nothing any more, or breaks off."""
-    walk, cycle = workspaces.walk, workspaces.cycle
+    transit, cycle = workspaces.transit, workspaces.cycle
     if outcome == QUIET:
-        write_quiet(functions, tables, ranks, mode, t, p, period, walk, cycle, rows, cell)
+        write_quiet(functions, tables, ranks, mode, t, p, period, transit, cycle, rows, cell)
     else:
-        write_end(functions, outcome, ranks, mode, t, p, period, walk, cycle, rows, cell)
+        write_end(functions, outcome, ranks, mode, t, p, period, transit, cycle, rows, cell)

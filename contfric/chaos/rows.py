@@ -32,7 +32,7 @@ class Starting(NamedTuple):
     ranks: IntArray
 
 
-class Limits(NamedTuple):
+class FollowingLimits(NamedTuple):
     """How long solutions are followed.
 
     Attributes
@@ -97,7 +97,7 @@ def follow(
     vectors: FloatArray,
     states: FloatArray,
     time: float,
-    limits: Limits,
+    limits: FollowingLimits,
     stop: IntArray | None = None,
 ) -> CellRows:
     """Follow motions, compiled and without Python's lock, and return their rows.
@@ -114,7 +114,7 @@ def follow(
     >>> from contfric.models import load_model
     >>> model = load_model("coulomb")
     >>> vectors = model.vector({"Omega": 0.5, "S": 0.32, "S0": 0.4})[None]
-    >>> rows = follow(model, vectors, np.array([[1.3, 0.0]]), 0.0, Limits(100, 600, 0.0))
+    >>> rows = follow(model, vectors, np.array([[1.3, 0.0]]), 0.0, FollowingLimits(100, 600, 0.0))
     >>> rows.turns
     array([1])
     """

@@ -57,8 +57,8 @@ from contfric.orbit.trajectory import (
 )
 from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_crossed, is_pressed, lying_on
 
-#: A walk has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE, INFINITE,
-#: QUIET, CHATTER), or the integration broke down.
+#: A transit has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE,
+#: INFINITE, QUIET, CHATTER), or the integration broke down.
 ARRIVED, BROKEN = 0, 10
 #: Halvings in the search of the place where the integration breaks down. A motion that has grown there by
 #: this factor grows without bound in a finite time (as 1/(time left) it has grown by 1e12), and one that
@@ -66,7 +66,7 @@ ARRIVED, BROKEN = 0, 10
 _HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
 
 
-class Walk(NamedTuple):
+class Transit(NamedTuple):
     """A state on its way from joint to joint, with the derivative of the last segment.
 
     Attributes
@@ -92,9 +92,9 @@ class Walk(NamedTuple):
 
 
 @allocating_helper
-def new_walk(n):  # type: ignore[no-untyped-def]
-    """Return the workspace for a walk of n states."""
-    return Walk(
+def new_transit(n):  # type: ignore[no-untyped-def]
+    """Return the workspace for a transit of n states."""
+    return Transit(
         np.empty(n),
         np.empty(1 + n),
         np.empty((n, 2 + n)),
@@ -115,7 +115,7 @@ def state_workspace(n):  # type: ignore[no-untyped-def]
 
 
 @helper
-def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # type: ignore[no-untyped-def]
+def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # type: ignore[no-untyped-def]
     """Go on to the next joint; a surface that is only touched is passed.
 
     Returns
@@ -123,19 +123,19 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
     tuple
         (outcome, surface, mode that follows, duration, periods completed, phase).
     """
-    y, observables = walk.y, tables.observables
-    walk.start[0] = t
+    y, observables = transit.y, tables.observables
+    transit.start[0] = t
     for j in range(y.shape[0]):
-        walk.start[1 + j] = y[j]
+        transit.start[1 + j] = y[j]
     duration, turns = 0.0, 0
-    at_most = NO_FLIGHT if walk.at_once[1] & 2 != 0 else NO_TIME
+    at_most = NO_FLIGHT if transit.at_once[1] & 2 != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     for k in range(tables.flights.shape[0]):
         if tables.flights[k] >= 0:  # after a wall it may begin at rest on a section
             on |= lying_on(functions, tables, t, y, p, workspace)
             break
     while True:
-        tau, surface = walk.ahead[0], walk.meets[0]
+        tau, surface = transit.ahead[0], transit.meets[0]
         if surface == SINGLY:
             tau, surface = first_hit(
                 functions, tables, mode, on, t, y, p, longest, period, workspace
@@ -150,14 +150,14 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 why = CHATTER  # flights too short to be resolved
-                if walk.at_once[2] == 0 or walk.at_once[0] == 0:
-                    why = too_large(functions, mode, duration, p, walk, workspace)
+                if transit.at_once[2] == 0 or transit.at_once[0] == 0:
+                    why = too_large(functions, mode, duration, p, transit, workspace)
                 return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
-        walk.at_once[0] = walk.at_once[0] + 1 if tau <= at_most * period else 0
-        struck = reset or (walk.at_once[2] != 0 and walk.at_once[0] > 0)
-        walk.at_once[2] = 1 if struck else 0
-        if walk.at_once[0] > MOST_AT_ONCE:
+        transit.at_once[0] = transit.at_once[0] + 1 if tau <= at_most * period else 0
+        struck = reset or (transit.at_once[2] != 0 and transit.at_once[0] > 0)
+        transit.at_once[2] = 1 if struck else 0
+        if transit.at_once[0] > MOST_AT_ONCE:
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
@@ -184,24 +184,24 @@ def to_joint(functions, tables, mode, on, t, p, period, walk, workspace):  # typ
             )
             chatter = tables.chatters[following, surface] if reset else -1
             if chatter >= 0:
-                copy_state(workspace.after, walk.end)
+                copy_state(workspace.after, transit.end)
                 if pressed or leads_to_rest(
                     functions, tables, chatter, surface, t, y, p, period, workspace
                 ):
                     following, pressed = chatter, False
-                copy_state(walk.end, workspace.after)
+                copy_state(transit.end, workspace.after)
             why = CHATTER if pressed else ARRIVED
             return why, surface, following, duration, turns, t
         if reset or is_crossed(functions, tables, mode, surface, t, y, p, period, workspace):
             return IMPOSSIBLE, surface, mode, duration, turns, t
         on = 1 << surface
-        walk.meets[0] = SINGLY  # from here on it was not asked for
+        transit.meets[0] = SINGLY  # from here on it was not asked for
 
 
 @helper
-def too_large(functions, mode, duration, p, walk, workspace):  # type: ignore[no-untyped-def]
+def too_large(functions, mode, duration, p, transit, workspace):  # type: ignore[no-untyped-def]
     """Tell a solution that diverged, also in a finite time, from one that breaks off."""
-    y, start, size = walk.y, walk.start, 0.0
+    y, start, size = transit.y, transit.start, 0.0
     for j in range(y.shape[0]):
         if abs(y[j]) >= TOO_LARGE:
             return INFINITE
@@ -211,11 +211,11 @@ def too_large(functions, mode, duration, p, walk, workspace):  # type: ignore[no
         middle, finite, here = 0.5 * (low + high), True, 0.0
         time = middle * duration
         functions.flow(
-            mode, start[0], start[1:], time, p, workspace.none, walk.end, workspace.nothing
+            mode, start[0], start[1:], time, p, workspace.none, transit.end, workspace.nothing
         )
         for j in range(y.shape[0]):
-            finite = finite and abs(walk.end[j]) < TOO_LARGE
-            here = max(here, abs(walk.end[j]))
+            finite = finite and abs(transit.end[j]) < TOO_LARGE
+            here = max(here, abs(transit.end[j]))
         if finite:
             low, last = middle, here
         else:
@@ -224,13 +224,13 @@ def too_large(functions, mode, duration, p, walk, workspace):  # type: ignore[no
 
 
 @helper
-def differentiate(functions, observable, mode, duration, t, p, walk, none):  # type: ignore[no-untyped-def]
-    """Differentiate the segment that a walk has just finished; return the rate at its exit."""
-    n = walk.y.shape[0]
-    jac, grad, start = walk.jac, walk.grad, walk.start
-    if walk.meets[0] == SINGLY:
-        functions.flow(mode, start[0], start[1:], duration, p, none, walk.end, jac)
-    met = walk.end if walk.at_once[1] & 2 != 0 else walk.y  # before a reset
+def differentiate(functions, observable, mode, duration, t, p, transit, none):  # type: ignore[no-untyped-def]
+    """Differentiate the segment that a transit has just finished; return the rate at its exit."""
+    n = transit.y.shape[0]
+    jac, grad, start = transit.jac, transit.grad, transit.start
+    if transit.meets[0] == SINGLY:
+        functions.flow(mode, start[0], start[1:], duration, p, none, transit.end, jac)
+    met = transit.end if transit.at_once[1] & 2 != 0 else transit.y  # before a reset
     functions.observe(observable, t, met, p, none, grad)
     rate = grad[0]
     for k in range(n):
@@ -239,12 +239,12 @@ def differentiate(functions, observable, mode, duration, t, p, walk, none):  # t
 
 
 @helper
-def behind(functions, surface, t, p, frame, count, walk, workspace, reset):  # type: ignore[no-untyped-def]
+def behind(functions, surface, t, p, frame, count, transit, workspace, reset):  # type: ignore[no-untyped-def]
     """Carry the first rows of a frame after a joint: over its reset, and without time if there is none."""
     if reset:
-        functions.reset(surface, t, workspace.after, p, workspace.none, walk.end, walk.jac)
-        apply_reset(frame, count, walk.jac, walk.image)
-    if walk.at_once[1] & 1 != 0:
+        functions.reset(surface, t, workspace.after, p, workspace.none, transit.end, transit.jac)
+        apply_reset(frame, count, transit.jac, transit.image)
+    if transit.at_once[1] & 1 != 0:
         for i in range(count):
             frame[i, 0] = 0.0
 

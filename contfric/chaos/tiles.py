@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.starts import default_states
 from contfric.chaos.status import Motion
 from contfric.chaos.work import Task
@@ -73,7 +73,7 @@ class Tile(Task):
     """
 
     model: Model
-    limits: Limits
+    limits: FollowingLimits
     vector: FloatArray
     varied: tuple[int, int]
     values: tuple[FloatArray, FloatArray]

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.chaos.averaging import Averages, new_averages
 from contfric.chaos.cycle import CycleWorkspace, Memory, new_cycle_workspace, new_memory
-from contfric.chaos.tangent import Walk, new_walk, state_workspace
+from contfric.chaos.tangent import Transit, new_transit, state_workspace
 from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.references import by_reference, words_of
 from contfric.flow.without import SINGLY
@@ -19,7 +19,7 @@ from contfric.orbit.trajectory import StateWorkspace
 class CellWorkspaces(NamedTuple):
     """All workspace of some solutions, with one more axis before the others; or of one of them."""
 
-    walk: Walk
+    transit: Transit
     state: StateWorkspace
     frame: FloatArray
     growth: FloatArray
@@ -31,15 +31,20 @@ class CellWorkspaces(NamedTuple):
 @allocating_helper
 def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
     """Return the workspace for so many solutions of n states."""
-    walk, state, memory, averages = new_walk(n), state_workspace(n), new_memory(n), new_averages(n)
+    transit, state, memory, averages = (
+        new_transit(n),
+        state_workspace(n),
+        new_memory(n),
+        new_averages(n),
+    )
     return CellWorkspaces(
-        Walk(
-            as_many(width, walk.y),
-            walk.start,
-            as_many(width, walk.jac),
-            walk.grad,
-            walk.end,
-            walk.image,
+        Transit(
+            as_many(width, transit.y),
+            transit.start,
+            as_many(width, transit.jac),
+            transit.grad,
+            transit.end,
+            transit.image,
             np.zeros((width, 3), dtype=np.int64),
             np.zeros(width),
             np.full(width, SINGLY),
@@ -77,18 +82,18 @@ def as_many(width, array):  # type: ignore[no-untyped-def]
 @inlined_helper
 def place(space, k):  # type: ignore[no-untyped-def]
     """Return the workspace of the solution in place k."""
-    walk, state, memory, averages = space.walk, space.state, space.memory, space.averages
+    transit, state, memory, averages = space.transit, space.state, space.memory, space.averages
     return CellWorkspaces(
-        Walk(
-            walk.y[k],
-            walk.start,
-            walk.jac[k],
-            walk.grad,
-            walk.end,
-            walk.image,
-            walk.at_once[k],
-            walk.ahead[k : k + 1],
-            walk.meets[k : k + 1],
+        Transit(
+            transit.y[k],
+            transit.start,
+            transit.jac[k],
+            transit.grad,
+            transit.end,
+            transit.image,
+            transit.at_once[k],
+            transit.ahead[k : k + 1],
+            transit.meets[k : k + 1],
         ),
         StateWorkspace(state.none, state.empty, state.nothing, state.after[k], state.trial),
         space.frame[k],

@@ -5,7 +5,7 @@ equations move the parameter by the last row of the inverse of their Jacobian. A
 an equation at the located point, and the rounding of the motion there. The sum of their moduli is a bound.
 
 * Sliding events: the margin that vanishes. T: the distance of the touch to its surface.
-* SN: a place along the branch that is held, as the parameter is stationary there; and the square of what
+* SN: a location along the branch that is held, as the parameter is stationary there; and the square of what
   is left of its slope.
 * BP, PD, NS: a multiplier as a function of the parameter, at a few neighbours that are solved for. A
   parabola through them has its zero there, and what they miss it by is rounding.
@@ -28,7 +28,7 @@ from contfric.continuation.zero_acceleration import joint_within, stationary_val
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
 #: the rounding of one, and no diagram resolves it.
@@ -81,7 +81,7 @@ class Estimate:
 
     kind: Kind
     here: Orbit
-    tests: tuple[Test, ...]
+    tests: tuple[EventFunction, ...]
     sides: tuple[Point, Point | None]
     point: Point
     parameter: str
@@ -126,13 +126,13 @@ class Estimate:
         return best
 
 
-def _margin(here: Orbit, test: Test, active: int) -> _Condition:
+def _margin(here: Orbit, test: EventFunction, active: int) -> _Condition:
     k = here.system.tests.index(test)
     gradient = gradient_of(here.as_whole(), test, here.system.segments, active)
     return _Condition(lambda orbit: float(orbit.margins[k]), test.segment, gradient)
 
 
-def _touch(here: Orbit, test: Test, active: int) -> _Condition | None:
+def _touch(here: Orbit, test: EventFunction, active: int) -> _Condition | None:
     """Return the distance of a stationary point or a joint to the surface that it meets at a tangency."""
     gaps = _gaps(here, test)
     if not len(gaps):
@@ -146,7 +146,9 @@ def _touch(here: Orbit, test: Test, active: int) -> _Condition | None:
     return _Condition(value, test.segment, _gap_gradient(here, test, k, active))
 
 
-def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatArray, float]:
+def _gap_gradient(
+    orbit: Orbit, test: EventFunction, k: int, active: int
+) -> tuple[FloatArray, float]:
     """Return the gradient of one of the distances of :func:`_gaps`."""
     model, i, count = orbit.model, test.segment, orbit.system.segments
     c = model.observable_index[test.surface]
@@ -171,7 +173,7 @@ def _gap_gradient(orbit: Orbit, test: Test, k: int, active: int) -> tuple[FloatA
     return gradient, slope
 
 
-def _gaps(orbit: Orbit, test: Test) -> FloatArray:
+def _gaps(orbit: Orbit, test: EventFunction) -> FloatArray:
     """Return the distances of an observable to its surfaces, at its stationary points and both joints."""
     model, i = orbit.model, test.segment
     c = model.observable_index[test.surface]

@@ -247,17 +247,17 @@ def _bounds(
 ) -> tuple[float, float]:
     """Return the range in which every turn follows its letter: its stops have positive margins.
 
-    The margins change sign where a stop meets the surface; between two such places that follow each
+    The margins change sign where a stop meets the surface; between two such locations that follow each
     other all of them keep their signs. At the ends of the bridge sticks of length zero solve every itinerary.
     """
     stops = list(_stops(start, turns, letters, bridge))
     rows = np.array([_margins(start, bridge.parameter, x, stops) for x in grid])
-    places = [grid[0], grid[-1]]
+    locations = [grid[0], grid[-1]]
     for k in range(len(stops)):
         for i in np.flatnonzero(rows[:-1, k] * rows[1:, k] < 0.0):
-            places.append(_root(start, bridge.parameter, grid[i], grid[i + 1], stops[k]))
-    places.sort()
-    for low, high in pairwise(places):
+            locations.append(_root(start, bridge.parameter, grid[i], grid[i + 1], stops[k]))
+    locations.sort()
+    for low, high in pairwise(locations):
         middle = _margins(start, bridge.parameter, 0.5 * (low + high), stops)
         if np.all(middle > 0.0):
             return float(low), float(high)

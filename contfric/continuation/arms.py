@@ -129,11 +129,11 @@ class Arms:
         other = self._repeated(self.shorter, len(sequence)).joints
         joints, own = orbit.joints.copy(), len(self.fold.system.holds)
         short = list(self.turning)
-        for number, places in enumerate(passages(orbit.system)):
+        for number, locations in enumerate(passages(orbit.system)):
             unit, hold = divmod(number, own)
             bit = 0 if self.as_one else short.index(hold) if hold in self.turning else self.letters
             if sequence[unit] >> bit & 1:
-                joints[places] = other[places]
+                joints[locations] = other[locations]
         return refine(replace(orbit, joints=joints, residual=np.inf), damped=False)
 
     def _repeated(self, orbit: Orbit, count: int) -> Orbit:

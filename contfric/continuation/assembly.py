@@ -114,15 +114,17 @@ def _known(
     """Return the events without folds that are not known to be any, and a note for each of these.
 
     Where the parameter changes by less over the whole branch than a fold's is known to, the sign of its slope
-    is rounding: a branch between two events in one place, next to a continuum of orbits.
+    is rounding: a branch between two events in one location, next to a continuum of orbits.
     """
     kept, notes = [], []
     span = float(np.ptp(values)) if len(values) else 0.0
     for b in events:
         narrow = b.kind is Kind.SN and span < _NARROW * settings.width
         if narrow and span <= b.accuracy * settings.width:
-            place = f"{settings.parameter} = {b.params[settings.parameter]:.12g}"
-            notes.append(f"{place}: the slope changes its sign within rounding, no fold is listed")
+            location = f"{settings.parameter} = {b.params[settings.parameter]:.12g}"
+            notes.append(
+                f"{location}: the slope changes its sign within rounding, no fold is listed"
+            )
         else:
             kept.append(b)
     return tuple(kept), notes
@@ -131,7 +133,7 @@ def _known(
 def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
     """Return a branch without the branch points of a multiplier that is 1 at an AS that ends it.
 
-    Where a contact comes to rest for good the places at which it may are a continuum: a multiplier tends
+    Where a contact comes to rest for good the locations at which it may are a continuum: a multiplier tends
     to 1 there, and before that, where segments are about to vanish, on which side it is is rounding.
     """
     found = branch.turn_multipliers

@@ -222,7 +222,7 @@ def locate(problem, sought, kinked, points, counts):  # type: ignore[no-untyped-
     ----------
     problem, sought : the branch, and the value
     kinked : whether the fields have kinks
-    points : four rows: both points, one for trials, and the place with what is watched there
+    points : four rows: both points, one for trials, and the location with what is watched there
     counts : what is counted
 
     Returns
@@ -230,7 +230,7 @@ def locate(problem, sought, kinked, points, counts):  # type: ignore[no-untyped-
     (float, bool)
         Position in the step, from 0 to 1; -1 if no trial point could be solved; -2 minus the
         position of the last good point if it is Newton that fails after it. And, for a label, whether
-        all trials were solved and had that of one of the points: then it changes at one place only, as far
+        all trials were solved and had that of one of the points: then it changes at one location only, as far
         as is seen.
     """
     zs, followed = points.joints, min(sought.number, 0)  # nothing, but no literal

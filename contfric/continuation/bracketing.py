@@ -15,10 +15,10 @@ from contfric.compiled import helper
 from contfric.compiling.references import by_reference
 from contfric.continuation.geometry import copy_to, copy_vector, distance, interpolate
 
-#: Share of the value at the start of a step that may be left at a place where trials fail: it is found, and
-#: they fail by rounding, as they do where joints are at times of many periods.
+#: Share of the value at the start of a step that may be left at a location where trials fail: it is found,
+#: and they fail by rounding, as they do where joints are at times of many periods.
 _LEFT = 1e-9
-#: Two trials that are farther apart than this many times the way between their places lie on two sheets: a
+#: Two trials that are farther apart than this many times the way between their locations lie on two sheets: a
 #: step is refused whose ends differ by a third of a radian in direction.
 _APART = 100.0
 #: Trials after which a bracket has the width of the arithmetic, whatever the function.
@@ -110,7 +110,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         Parameters
         ----------
         way, sought : what the two functions need
-        points : four rows; the third one is for trials, the place is left in the fourth
+        points : four rows; the third one is for trials, the location is left in the fourth
         ends : (value at row 0, value at row 1)
         rules : :class:`Rules`
 

@@ -5,7 +5,7 @@ rest is left without acceleration (:attr:`contfric.models.definition.Model.filip
 continuous, and there are four cases:
 
 =====================================  =================================================================
-event, at the place                    edit of the itinerary
+event, at the location                    edit of the itinerary
 =====================================  =================================================================
 two contacts change at once            they change in the other order
 a surface is touched inside            split it there: the contact changes its state, for no time
@@ -28,7 +28,7 @@ from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, split, swap_edit
 from contfric.signature.holds import is_hold
 
@@ -42,21 +42,21 @@ Joints = dict[tuple[int, int], FloatArray]
 Speeds = dict[tuple[int, int], float]
 
 
-def continuous_edit(orbit: Orbit, place: Test) -> tuple[Edit, Joints, Speeds, str]:
-    """Return the edit at a place where nothing jumps, its joints, how they move away, and why.
+def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit at a location where nothing jumps, its joints, how they move away, and why.
 
     Raises
     ------
     NotationError
-        If nothing follows from this place: the reason says why.
+        If nothing follows from this location: the reason says why.
     """
-    itinerary, i = orbit.itinerary, place.segment
+    itinerary, i = orbit.itinerary, location.segment
     if is_hold(itinerary[i][1]):
         raise NotationError(f"segment {i + 1} is a hold: where nothing jumps there is none")
-    if place.margin is Margin.JOINT:
-        return _two_at_once(orbit, i, place.surface)
-    if place.margin is Margin.INTERIOR:
-        return _touched(orbit, i, place.surface)
+    if location.margin is Margin.JOINT:
+        return _two_at_once(orbit, i, location.surface)
+    if location.margin is Margin.INTERIOR:
+        return _touched(orbit, i, location.surface)
     return _vanished(orbit, i)
 
 

@@ -18,7 +18,7 @@ a second hold. The slide moves the mass by the fourth power of d, the square of 
 relation of this form is that of the form with one hold; its inequality is -w >= 0 in place of w >= 0.
 
 For a sequence of n units these are n (m + k) + n units' joints and one lambda: a ray on each side. A sequence
-exists on a side if its ray obeys all inequalities. For places with two outcomes each this is the linear
+exists on a side if its ray obeys all inequalities. For locations with two outcomes each this is the linear
 complementarity problem of docs/bridges.md, written so that an outcome of any kind fits.
 """
 
@@ -180,14 +180,14 @@ def _gradients(
     """
     whole, count = orbit.as_whole(), orbit.system.segments
     found = []
-    for place, _ in vanishing(whole, least):
-        held = place.margin is Margin.HELD
-        if place.segment >= count or (held and place.segment in parted):
+    for location, _ in vanishing(whole, least):
+        held = location.margin is Margin.HELD
+        if location.segment >= count or (held and location.segment in parted):
             continue
         gradient = (
-            held_gradient(whole, place.segment, count, active)
+            held_gradient(whole, location.segment, count, active)
             if held
-            else gradient_of(whole, place, count, active)
+            else gradient_of(whole, location, count, active)
         )
         if gradient is not None:
             found.append(gradient)

@@ -77,9 +77,9 @@ def opening(orbit: Orbit) -> float:
 def opens_through(orbit: Orbit, active: int) -> bool:
     """Tell whether a multiplier of the turn passes -1 at a vertex, and does not only touch it.
 
-    At a continuum (Omega = 1/2) it touches: the place is good to the root of rounding. Next to an exit that
-    becomes tangential it passes -1 and then infinity: a shorter way tells that it passes. Where a fold is so
-    near that there is no orbit on one side of the parameter the curve of orbits is asked.
+    At a continuum (Omega = 1/2) it touches: the location is good to the root of rounding. Next to an exit
+    that becomes tangential it passes -1 and then infinity: a shorter way tells that it passes. Where a fold
+    is so near that there is no orbit on one side of the parameter the curve of orbits is asked.
     """
     value, told = float(orbit.vector[active]), False
     for beside in _BESIDE:

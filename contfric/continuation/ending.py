@@ -6,8 +6,8 @@ import numpy as np
 
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import limit_end
+from contfric.continuation.locations import locations_of
 from contfric.continuation.outcomes import NoJump, outcome_at
-from contfric.continuation.places import places_of
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.touching import entered_at, thrown_at
@@ -39,7 +39,7 @@ _AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
 
 
 def is_point(orbit: Orbit) -> bool:
-    """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one place."""
+    """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one location."""
     if not orbit.model.autonomous:
         return False
     states = orbit.joints[:, 1:]
@@ -205,9 +205,9 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     continuous = f"{kind.meaning}: the signature changes, the solution is continuous"
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
-    for place in places_of(bifurcation)[:1]:
+    for location in locations_of(bifurcation)[:1]:
         try:
-            outcome_at(orbit.as_whole(), place, kind)
+            outcome_at(orbit.as_whole(), location, kind)
         except NoJump:
             return continuous
         except NotationError:

@@ -18,7 +18,7 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import Outline
-from contfric.orbit.system import Test
+from contfric.orbit.system import EventFunction
 from contfric.remember.stored import made_of
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ class Bifurcation(MeasuredEvent):
         None if not computed or if the branch has no such side. At a fold (SN) both sides lie at the same
         values: there it is the order of the branch.
     located : bool
-        False if a test changed sign but Newton failed on the way to the place: the parameters are
+        False if a test changed sign but Newton failed on the way to the location: the parameters are
         those of the last solved point before it.
     bound : float or callable
         The accuracy, or what returns it when it is asked for.
@@ -203,7 +203,7 @@ class Bifurcation(MeasuredEvent):
     kind: Kind
     params: dict[str, float]
     orbit: Orbit
-    tests: tuple[Test, ...] = ()
+    tests: tuple[EventFunction, ...] = ()
     position: float = 0.0
     stable_before: bool | None = None
     stable_after: bool | None = None

@@ -67,7 +67,7 @@ def _split_between(
 ) -> Located | None:
     """Return where the touch that a hold is pinned to splits, if that is why the slope changes its sign.
 
-    Around it Newton may be lost: the step is taken back until it is as short as the place is known.
+    Around it Newton may be lost: the step is taken back until it is as short as the location is known.
     """
     if not orbit.system.holds:
         return None
@@ -131,10 +131,10 @@ def overshot_vertex(
     """Return the vertex between two points on its two sides, if it is one."""
     point = parabola_vertex(before, after, share)
     point.w = before.w + share * (after.w - before.w)
-    found, place = _fold(orbit, before, after, point, settings)
+    found, location = _fold(orbit, before, after, point, settings)
     if found.kind is Kind.SN:
         return None
-    return found, place
+    return found, location
 
 
 def vertex_at(orbit: Orbit, point: Point, settings: Settings) -> Bifurcation | None:

@@ -8,7 +8,7 @@ from contfric.continuation.zero_acceleration import left_to, touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: A hold this short is one that vanishes: what its margins say is its length.
 _SHORT = 1e-3
@@ -25,34 +25,36 @@ def closing(orbit: Orbit, active: int) -> FloatArray:
 
 
 def gradient_of(
-    orbit: Orbit, place: Test, count: int, active: int
+    orbit: Orbit, location: EventFunction, count: int, active: int
 ) -> tuple[FloatArray, float] | None:
     """Return the gradient of one margin; None if it has none to first order."""
-    i, m = place.segment, orbit.joints.shape[1]
+    i, m = location.segment, orbit.joints.shape[1]
     gradient, slope = np.zeros((count + 1, m)), 0.0
     held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
     short = held is not None and orbit.ends[i, 0] - orbit.cycle[i, 0] < _SHORT
-    if place.margin is Margin.LASTING or short:
+    if location.margin is Margin.LASTING or short:
         gradient[i + 1, 0], gradient[i, 0] = 1.0, -1.0
         return gradient, slope
-    sign = _sign(orbit, place)
-    if place.margin is Margin.JOINT:
-        gradient[i + 1], slope = surface_gradient(orbit, place.surface, orbit.ends[i], active)
-    elif place.margin is Margin.EXIT:
+    sign = _sign(orbit, location)
+    if location.margin is Margin.JOINT:
+        gradient[i + 1], slope = surface_gradient(orbit, location.surface, orbit.ends[i], active)
+    elif location.margin is Margin.EXIT:
         mode = held.departs if held is not None else orbit.itinerary[i][0]
-        gradient[i + 1], slope = _rate_gradient(orbit, mode, place.surface, orbit.ends[i], active)
-    elif place.margin is Margin.INTERIOR:
+        gradient[i + 1], slope = _rate_gradient(
+            orbit, mode, location.surface, orbit.ends[i], active
+        )
+    elif location.margin is Margin.INTERIOR:
         try:
-            touch = touch_of(orbit, i, place.surface)
+            touch = touch_of(orbit, i, location.surface)
         except NotationError:
             return None
         if (
             touch[0] == orbit.begins[i, 0]
         ):  # the load of a hold that starts on its limit: whether it falls
             mode = orbit.itinerary[i][0]
-            gradient[i], slope = _rate_gradient(orbit, mode, place.surface, touch, active)
+            gradient[i], slope = _rate_gradient(orbit, mode, location.surface, touch, active)
             return sign * gradient, sign * slope
-        there, slope = surface_gradient(orbit, place.surface, touch, active)
+        there, slope = surface_gradient(orbit, location.surface, touch, active)
         gradient[i], moves = carried(orbit, i, touch, there, active)
         slope += moves
     else:
@@ -77,13 +79,13 @@ def held_gradient(orbit: Orbit, i: int, count: int, active: int) -> tuple[FloatA
     return sign * gradient, sign * (float(grad[m]) + moves)
 
 
-def _sign(orbit: Orbit, place: Test) -> float:
+def _sign(orbit: Orbit, location: EventFunction) -> float:
     """Return the sign with which a margin counts what it watches."""
-    layout, i = orbit.system.layout, place.segment
-    if place.margin is Margin.EXIT:
+    layout, i = orbit.system.layout, location.segment
+    if location.margin is Margin.EXIT:
         return float(layout.exit_signs[i])
-    k = orbit.model.surface_index[place.surface]
-    rows = layout.joint if place.margin is Margin.JOINT else layout.interior
+    k = orbit.model.surface_index[location.surface]
+    rows = layout.joint if location.margin is Margin.JOINT else layout.interior
     return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
 
 

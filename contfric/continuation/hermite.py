@@ -13,7 +13,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.motion import Directions
 
-#: Resolution of a place, as a share of a step: that of the arithmetic.
+#: Resolution of a location, as a share of a step: that of the arithmetic.
 _SHORTEST = 1e-15
 
 
@@ -50,7 +50,7 @@ def zero_between(
 ) -> Point | None:
     """Return the point of a step at which a value of its solved points is zero; None if Newton fails.
 
-    The value has different signs at both ends; the place is found by Brent's method.
+    The value has different signs at both ends; the location is found by Brent's method.
     """
     from scipy.optimize import brentq
 

@@ -1,10 +1,10 @@
 """All itineraries that the solution at an event solves: its regular outcomes, and those that are held.
 
-At an event one motion solves the equations of several itineraries. The itineraries differ at **places** of
+At an event one motion solves the equations of several itineraries. The itineraries differ at **locations** of
 the motion only: a stop on the limit, a touch inside of a stick, a stop without acceleration, a touch of rest
-inside of a slide. At each place there are few local outcomes (:mod:`contfric.continuation.outcomes`). Which
-itineraries there are is a property of the motion, not of the branch that came to it. So they are collected as
-a closure:
+inside of a slide. At each location there are few local outcomes (:mod:`contfric.continuation.outcomes`).
+Which itineraries there are is a property of the motion, not of the branch that came to it. So they are
+collected as a closure:
 
 1. The motion is cut down to its shortest period, and to half of it if it is its own symmetry image. That is
    its **unit**. It is cut at the start of a slide of some length, which every itinerary has.
@@ -25,8 +25,8 @@ import numpy as np
 
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
+from contfric.continuation.locations import TANGENTIAL, locations_of, normal_location
 from contfric.continuation.outcomes import NO_LENGTH_AT_TOUCH, Outcome, RestsForEver, outcome_at
-from contfric.continuation.places import TANGENTIAL, normal_place, places_of
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -35,14 +35,14 @@ from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
-from contfric.orbit.system import Itinerary, Margin, Test, build_system
+from contfric.orbit.system import EventFunction, Itinerary, Margin, build_system
 from contfric.signature.edits import apply_edit, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
 _VANISHES = 1e-9
 #: The same at an event that is located to half of the digits only.
 _NEARLY = 1e-6
-#: Most forms of a unit: six places with two outcomes each.
+#: Most forms of a unit: six locations with two outcomes each.
 _MOST_FORMS = 64
 #: Where in a segment it is asked how far something has moved, as shares of it.
 _SHARES = (0.25, 0.5, 1.0)
@@ -87,7 +87,7 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     Parameters
     ----------
     wide : bool
-        Whether margins that nearly vanish count: where the place is known to half of the digits.
+        Whether margins that nearly vanish count: where the location is known to half of the digits.
     """
     orbit = bifurcation.orbit.as_whole()
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
@@ -100,8 +100,8 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     collection = _started(cut or orbit, unit_of(cut) if cut else unit, least)
     unit = collection.unit
     if cut is None:
-        places = [(place, bifurcation.kind) for place in places_of(bifurcation)]
-        collection.edit(orbit, np.zeros(len(orbit.itinerary)), "", places)
+        locations = [(location, bifurcation.kind) for location in locations_of(bifurcation)]
+        collection.edit(orbit, np.zeros(len(orbit.itinerary)), "", locations)
     collection.close()
     return Incident(
         unit,
@@ -174,7 +174,7 @@ class _Collection:
         return frozenset(piece.itinerary for piece in taken)
 
     def close(self) -> None:
-        """Add what the outcomes at the places of every form make of it."""
+        """Add what the outcomes at the locations of every form make of it."""
         while self._waiting:
             form = self._waiting.popleft()
             try:
@@ -184,47 +184,51 @@ class _Collection:
                 self.forms = [other for other in self.forms if other is not form]
                 continue
             count = len(form.itinerary)
-            places = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
+            locations = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
             away = np.concatenate([form.away, form.away]) if self.unit.half else form.away
-            self.edit(orbit, away, form.reason, places)
+            self.edit(orbit, away, form.reason, locations)
 
     def edit(
-        self, orbit: Orbit, away: FloatArray, reason: str, places: list[tuple[Test, Kind]]
+        self,
+        orbit: Orbit,
+        away: FloatArray,
+        reason: str,
+        locations: list[tuple[EventFunction, Kind]],
     ) -> None:
-        """Add the forms that follow from the outcomes at places of an orbit."""
-        if not places:
+        """Add the forms that follow from the outcomes at locations of an orbit."""
+        if not locations:
             return
         before = frozenset(piece.itinerary for piece in pieces(orbit, self.unit))
-        for place, kind in places:
+        for location, kind in locations:
             try:
-                outcome = outcome_at(orbit, place, kind)
+                outcome = outcome_at(orbit, location, kind)
                 edited, moves = edited_whole(orbit, [outcome], away)
                 text = "; ".join(filter(None, (reason, outcome.reason)))
                 after = self.take(edited, moves, text)
                 self.names.append(Name(kind, before, after - before))
             except NotationError as error:
                 rest = isinstance(error, RestsForEver)
-                text = f"change at segment {place.segment + 1}"
+                text = f"change at segment {location.segment + 1}"
                 refusal = Refusal(text, str(error), rest)
                 if refusal not in self.refusals:
                     self.refusals.append(refusal)
 
 
-def vanishing(orbit: Orbit, least: float) -> list[tuple[Test, Kind]]:
-    """Return the places of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
-    found: dict[Test, Kind] = {}
+def vanishing(orbit: Orbit, least: float) -> list[tuple[EventFunction, Kind]]:
+    """Return the locations of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
+    found: dict[EventFunction, Kind] = {}
     for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
         if not abs(value) < (least if is_linear(test, orbit) else max(least, TANGENTIAL)):
             continue
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:
-            found.setdefault(normal_place(test, orbit), kind)
-    for place in _vanished(orbit):
-        found.setdefault(place, Kind.GS)
+            found.setdefault(normal_location(test, orbit), kind)
+    for location in _vanished(orbit):
+        found.setdefault(location, Kind.GS)
     return list(found.items())
 
 
-def is_linear(test: Test, orbit: Orbit) -> bool:
+def is_linear(test: EventFunction, orbit: Orbit) -> bool:
     """Tell whether a margin goes through zero at an event, and does not reach it with its root.
 
     The rate at an exit does where an orbit comes to the tangency; a hold may be left anywhere.
@@ -234,7 +238,7 @@ def is_linear(test: Test, orbit: Orbit) -> bool:
     )
 
 
-def _vanished(orbit: Orbit) -> Iterator[Test]:
+def _vanished(orbit: Orbit) -> Iterator[EventFunction]:
     """Yield the holds at a touch of rest that are too short to be told from none.
 
     Their margins do not show it: they are of the order of the length, and its square is what is located.
@@ -243,7 +247,7 @@ def _vanished(orbit: Orbit) -> Iterator[Test]:
     for hold in orbit.system.holds:
         touches = hold.pin is None and not hold.after_rest
         if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH * time_unit(orbit):
-            yield Test(Margin.EXIT, hold.segment, hold.leaves)
+            yield EventFunction(Margin.EXIT, hold.segment, hold.leaves)
 
 
 def edited_whole(

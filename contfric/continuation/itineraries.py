@@ -153,7 +153,7 @@ class _Images:
 
 
 def _between(rows: FloatArray, x: FloatArray) -> FloatArray:
-    """Return each row at a place between its samples, by linear interpolation."""
+    """Return each row at a location between its samples, by linear interpolation."""
     k = np.minimum(x.astype(int), rows.shape[1] - 2)
     every, share = np.arange(len(rows)), x - k
     found: FloatArray = rows[every, k] * (1.0 - share) + rows[every, k + 1] * share

@@ -41,7 +41,7 @@ from contfric.continuation.touching import (
 from contfric.models.definition import FloatArray
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, System, Test, inside_sign
+from contfric.orbit.system import EventFunction, Margin, System, inside_sign
 from contfric.signature.holds import ends_rest
 
 #: A slide after a hold that is this short has vanished where one of its margins has: they are its length
@@ -54,7 +54,7 @@ ROUNDED = 1e-6
 _LATER = 1e-4
 
 
-def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
+def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
     model, mode = system.model, system.itinerary[test.segment][0]
     hold = hold_of_test(test, orbit)
@@ -79,7 +79,7 @@ def kind_of_margin(system: System, test: Test, orbit: Orbit) -> Kind:
     return Kind.CS if _leaves(system, test, orbit) else Kind.SS
 
 
-def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
+def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
     """Return the hold that a margin belongs to: its own, or of the slide after it that has vanished."""
     for hold in orbit.system.holds:
         if test.segment == hold.segment:
@@ -92,7 +92,7 @@ def hold_of_test(test: Test, orbit: Orbit) -> Hold | None:
     return None
 
 
-def kind_of_hold(hold: Hold, test: Test) -> Kind:
+def kind_of_hold(hold: Hold, test: EventFunction) -> Kind:
     """Return the event that an end of a hold's freedom is: that which the hold is pinned to.
 
     Unless it touches its limit on the way (AS), or can just not be left there (GS).
@@ -108,7 +108,7 @@ def kind_of_hold(hold: Hold, test: Test) -> Kind:
     return Kind.AS if hold.after_rest else Kind.GS
 
 
-def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
+def outward_rate(system: System, test: EventFunction, orbit: Orbit) -> float:
     """Rate at which a state that rests at the joint would leave the region where it can rest.
 
     Infinite where there is no rest.
@@ -120,7 +120,7 @@ def outward_rate(system: System, test: Test, orbit: Orbit) -> float:
     return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
 
 
-def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
+def _leaves(system: System, test: EventFunction, orbit: Orbit) -> bool:
     """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
 
     A load that stands still at the stop grows after it where it has its minimum: a stick around the minimum
@@ -134,7 +134,7 @@ def _leaves(system: System, test: Test, orbit: Orbit) -> bool:
     return bends_outward(orbit, resting.mode, test.surface, sign, end)
 
 
-def stands_still(orbit: Orbit, test: Test) -> bool:
+def stands_still(orbit: Orbit, test: EventFunction) -> bool:
     """Tell whether the load stands still at a stop and moves before or after: it is extreme there.
 
     Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.

@@ -35,7 +35,7 @@ def locate_events(
 def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings) -> bool:
     """Tell whether a smooth event before a sliding event, or after it, is part of it.
 
-    Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a place
+    Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a location
     along the branch is good to the root of what the parameter is. A vertex is no such fold: the simpler
     orbits there have been solved.
     """

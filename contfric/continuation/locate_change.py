@@ -61,7 +61,7 @@ def locate_label(
     """Locate a change of a label: the first one, seen from the one point, and the last one if it is another.
 
     Where every trial had one of the two labels the last change, seen from the other point, is the first:
-    the same places are tried.
+    the same locations are tried.
     """
     from contfric.continuation.bracket import BY_LABEL
 
@@ -84,7 +84,7 @@ def _located(
     index: int,
     target: float,
 ) -> tuple[Point | None, bool]:
-    """Return the place of one change of sign, and whether a label changes at one place only."""
+    """Return the location of one change of sign, and whether a label changes at one location only."""
     from contfric.continuation.bracket import BY_TEST, locate
 
     rows = _TRIALS.between(orbit.system, before, after)

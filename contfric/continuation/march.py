@@ -9,7 +9,7 @@ arc, ``c (1 + angle^2 / 24)``.
 
 Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the largest pair of
 multipliers, and the labels of its segments. The march stops at the first step over which any of them
-changes sign; :mod:`contfric.continuation.bracket` then locates the place. A step within which one of them
+changes sign; :mod:`contfric.continuation.bracket` then locates the location. A step within which one of them
 may change its sign twice is taken again, shorter (:mod:`contfric.continuation.pairs`).
 """
 

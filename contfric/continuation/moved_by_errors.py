@@ -70,10 +70,10 @@ def _sparse_weights(
 
     count, m = c.shape
     size = count * m
-    places: NDArray[np.int64] = np.arange(size).reshape(count, m)
-    across = np.repeat(places[:, :, None], m, axis=2).ravel()
-    own = np.repeat(places[:, None, :], m, axis=1)
-    rows = np.concatenate([across, across, places.ravel(), np.full(size + 1, size)])
+    locations: NDArray[np.int64] = np.arange(size).reshape(count, m)
+    across = np.repeat(locations[:, :, None], m, axis=2).ravel()
+    own = np.repeat(locations[:, None, :], m, axis=1)
+    rows = np.concatenate([across, across, locations.ravel(), np.full(size + 1, size)])
     following = np.roll(own, -1, axis=0).ravel()
     columns = np.concatenate([own.ravel(), following, np.full(size, size), np.arange(size + 1)])
     values = np.concatenate([a.ravel(), b.ravel(), c.ravel(), row])

@@ -3,7 +3,7 @@
 An orbit with holds has no multipliers. But its equations can be singular for a disturbance that changes
 sign after a turn as those of any orbit, and a branch leaves there: of a symmetric orbit the asymmetric
 ones, of others those of twice the period. The sign of the determinant tells (:mod:`contfric.orbit.index`),
-and the place is located as at the vertex of a pitchfork.
+and the location is located as at the vertex of a pitchfork.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What can follow a sliding event at one place of an orbit: the edit of its itinerary, and why.
+"""What can follow a sliding event at one location of an orbit: the edit of its itinerary, and why.
 
 The solution at the event is known, so the local structure of each outcome can be derived from it
 (``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
 
 =====================================  ========================================================
-event, at the place                    outcome
+event, at the location                    outcome
 =====================================  ========================================================
 CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
 SS, followed by a reversal             insert a hold of length zero, pinned to F
@@ -51,7 +51,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
 from contfric.orbit.starts import signs_at
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
 
@@ -87,7 +87,7 @@ class NoJump(NotationError):
 
 @dataclass(frozen=True)
 class Outcome:
-    """One outcome at one place.
+    """One outcome at one location.
 
     Attributes
     ----------
@@ -105,70 +105,72 @@ class Outcome:
     away: Mapping[Origin, float] = field(default_factory=dict)
 
 
-def outcome_at(orbit: Orbit, place: Test, kind: Kind) -> Outcome:
-    """Return what can follow at one place of a whole orbit.
+def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
+    """Return what can follow at one location of a whole orbit.
 
     Raises
     ------
     NotationError
         If nothing can: the reason says why.
     """
-    mode, exit_ = orbit.itinerary[place.segment]
+    mode, exit_ = orbit.itinerary[location.segment]
     if is_hold(exit_):
-        return _hold_ends(orbit, place)
-    if reset := chosen_at(orbit.system, place):
+        return _hold_ends(orbit, location)
+    if reset := chosen_at(orbit.system, location):
         raise NotationError(f"at '{reset}' another mode is chosen: nothing lies between the two")
-    if entered := entered_at(orbit.system, place):
+    if entered := entered_at(orbit.system, location):
         raise NotationError(
-            f"a touch of {place.surface} leads into '{entered}' for good: no orbit is near"
+            f"a touch of {location.surface} leads into '{entered}' for good: no orbit is near"
         )
-    if place.margin is Margin.ENTRY:
-        raise NotationError(f"another mode follows the impact before segment {place.segment + 1}")
-    if place.margin is Margin.JOINT and orbit.model.reset_at(mode, place.surface) is not None:
-        where = f"where segment {place.segment + 1} ends"
-        raise NotationError(f"the wall {place.surface} is met {where}")
+    if location.margin is Margin.ENTRY:
+        raise NotationError(
+            f"another mode follows the impact before segment {location.segment + 1}"
+        )
+    if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
+        where = f"where segment {location.segment + 1} ends"
+        raise NotationError(f"the wall {location.surface} is met {where}")
     if orbit.model.composed and orbit.model.filippov:
-        edit, joints, away, reason = continuous_edit(orbit, place)
+        edit, joints, away, reason = continuous_edit(orbit, location)
         return Outcome(edit, joints, reason, away)
     if kind is Kind.CS:
-        i, surface = place.segment, place.surface
+        i, surface = location.segment, location.surface
         edit, joints = (
             swap_edit(orbit.itinerary, {i: surface}, orbit.model),
             {(i, 0): orbit.ends[i]},
         )
         return Outcome(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
     if kind is Kind.SS:
-        return _stop_on_surface(orbit, place)
-    if orbit.model.reset_at(mode, place.surface) is not None:
-        return _grazing_impact(orbit, place)
-    if place.margin is Margin.JOINT:
-        raise NoJump(f"{place.surface} is touched at a section: nothing can be held there")
-    if place.margin is Margin.LASTING:
-        return _pinned_at_stop(orbit, place)
-    rests, ends = ends_rest(orbit.model, mode, place.surface), place.margin is Margin.EXIT
+        return _stop_on_surface(orbit, location)
+    if orbit.model.reset_at(mode, location.surface) is not None:
+        return _grazing_impact(orbit, location)
+    if location.margin is Margin.JOINT:
+        raise NoJump(f"{location.surface} is touched at a section: nothing can be held there")
+    if location.margin is Margin.LASTING:
+        return _pinned_at_stop(orbit, location)
+    rests, ends = ends_rest(orbit.model, mode, location.surface), location.margin is Margin.EXIT
     if rests:
-        return _released_tangentially(orbit, place) if ends else _limit_touched(orbit, place)
-    return _stops_tangentially(orbit, place) if ends else _rest_touched(orbit, place)
+        return _released_tangentially(orbit, location) if ends else _limit_touched(orbit, location)
+    return _stops_tangentially(orbit, location) if ends else _rest_touched(orbit, location)
 
 
-def _stop_on_surface(orbit: Orbit, place: Test) -> Outcome:
+def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Outcome:
     """SS: the stop is on a surface, and the load falls."""
-    model, itinerary, i = orbit.model, orbit.itinerary, place.segment
+    model, itinerary, i = orbit.model, orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
     if goes_nowhere(orbit, j):
         return Outcome(*left_out(orbit, j))
     rest = _rest_mode(orbit, i, itinerary[i][1])
-    _check_held(orbit, rest, release_mode(model, rest, place.surface), orbit.ends[i])
+    _check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
     if model.lies_on(itinerary[j][0], itinerary[i][1]):
-        return _stick_becomes_hold(orbit, j, hold_at(place.surface), place.surface)
-    edit = insert(i, (rest, hold_at(place.surface)))
-    reason = f"hold at stop {i + 1}, on {place.surface}, instead of the reversal"
+        return _stick_becomes_hold(orbit, j, hold_at(location.surface), location.surface)
+    edit = insert(i, (rest, hold_at(location.surface)))
+    reason = f"hold at stop {i + 1}, on {location.surface}, instead of the reversal"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
-def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
+def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     """GS: a stop without acceleration."""
-    itinerary, i = orbit.itinerary, place.segment
+    itinerary, i = orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
     _rest_mode(orbit, i, itinerary[i][1])
     if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
@@ -179,52 +181,52 @@ def _stops_tangentially(orbit: Orbit, place: Test) -> Outcome:
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
 
-def _released_tangentially(orbit: Orbit, place: Test) -> Outcome:
+def _released_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     """AS: a stick is released where its load just reaches the limit."""
-    i, (mode, exit_) = place.segment, orbit.itinerary[place.segment]
+    i, (mode, exit_) = location.segment, orbit.itinerary[location.segment]
     _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
     reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
-def _pinned_at_stop(orbit: Orbit, place: Test) -> Outcome:
+def _pinned_at_stop(orbit: Orbit, location: EventFunction) -> Outcome:
     """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
-    i, surface = place.segment, orbit.itinerary[place.segment][1]
+    i, surface = location.segment, orbit.itinerary[location.segment][1]
     edit = Edit(frozenset({i}), {(i + 1) % len(orbit.itinerary): hold_at(surface)})
     return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold after it starts at the stop")
 
 
-def _limit_touched(orbit: Orbit, place: Test) -> Outcome:
+def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     """AS: inside of a stick its load touches the limit."""
-    model, itinerary, i = orbit.model, orbit.itinerary, place.segment
+    model, itinerary, i = orbit.model, orbit.itinerary, location.segment
     mode, exit_ = itinerary[i]
     j = (i + 1) % len(itinerary)
-    touch = touch_of(orbit, i, place.surface)
-    departs = _released(model, mode, place.surface)
+    touch = touch_of(orbit, i, location.surface)
+    departs = _released(model, mode, location.surface)
     _check_held(orbit, mode, departs, touch)
-    reason = f"hold after the touch of {place.surface} in stick {i + 1}"
+    reason = f"hold after the touch of {location.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
         left = (departs, left_surface(model, mode, departs))
-        edit = split(i, place.surface, (mode, TOUCH), left, (mode, exit_))
+        edit = split(i, location.surface, (mode, TOUCH), left, (mode, exit_))
         away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
         return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
     if is_hold(itinerary[j][1]):  # the stick ended tangentially: its hold begins earlier
-        edit = Edit(renamed={i: place.surface, j: TOUCH})
+        edit = Edit(renamed={i: location.surface, j: TOUCH})
         return Outcome(edit, {(j, -1): touch}, reason)
-    return Outcome(split(i, place.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+    return Outcome(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
 
 
-def _rest_touched(orbit: Orbit, place: Test) -> Outcome:
+def _rest_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     """GS: inside of a slide the velocity touches zero."""
-    i = place.segment
+    i = location.segment
     mode, exit_ = orbit.itinerary[i]
-    touch = touch_of(orbit, i, place.surface)
-    rest = _rest_mode(orbit, i, place.surface)
+    touch = touch_of(orbit, i, location.surface)
+    rest = _rest_mode(orbit, i, location.surface)
     _check_inside(orbit, rest, touch)
-    edit = split(i, place.surface, (rest, TOUCH), (mode, exit_))
+    edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))
     reason = f"hold at the touch of rest in slide {i + 1}"
     return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
 
@@ -265,9 +267,9 @@ def _released(model: Model, mode: str, surface: str) -> str:
     return found
 
 
-def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
+def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
     """Return what follows where a hold comes to an end of its freedom."""
-    h, itinerary = place.segment, orbit.itinerary
+    h, itinerary = location.segment, orbit.itinerary
     before, behind = h - 1, (h + 1) % len(itinerary)
     after_rest = ends_rest(orbit.model, *itinerary[before])
     at_touch = itinerary[h][1] == TOUCH
@@ -278,13 +280,13 @@ def _hold_ends(orbit: Orbit, place: Test) -> Outcome:
             fused = Edit(frozenset({h, behind}), {before % len(itinerary): itinerary[behind][1]})
             return Outcome(fused, {}, reason)
         return Outcome(drop(h), {}, reason)
-    if place.margin is Margin.JOINT:
-        reason = f"hold {h + 1} lasts to its regular release at {place.surface}"
-        return Outcome(_as_stick(orbit, h, place.surface, after_rest, ()), {}, reason)
-    if place.margin is Margin.EXIT:
+    if location.margin is Margin.JOINT:
+        reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
+        return Outcome(_as_stick(orbit, h, location.surface, after_rest, ()), {}, reason)
+    if location.margin is Margin.EXIT:
         return _never_left(orbit, h, after_rest)
-    if place.margin is Margin.INTERIOR:
-        return _pin_moves(orbit, place, after_rest)
+    if location.margin is Margin.INTERIOR:
+        return _pin_moves(orbit, location, after_rest)
     lasts = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
     gone = lasts < NEARLY_NO_LENGTH * time_unit(orbit)
     if (
@@ -321,17 +323,19 @@ def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
     return Outcome(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
 
 
-def _pin_moves(orbit: Orbit, place: Test, after_rest: bool) -> Outcome:
+def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Outcome:
     """Return the outcome where a hold touches its limit: a stick to there, and the hold after it."""
-    h = place.segment
-    touch = touch_of(orbit, h, place.surface)
-    reason = f"hold {h + 1} touches {place.surface}: its pin moves there"
+    h = location.segment
+    touch = touch_of(orbit, h, location.surface)
+    reason = f"hold {h + 1} touches {location.surface}: its pin moves there"
     if after_rest:
-        if touches_again(orbit, h, place.surface, float(orbit.cycle[h, 0])):
+        if touches_again(orbit, h, location.surface, float(orbit.cycle[h, 0])):
             raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
-        edit = Edit(renamed={(h - 1) % len(orbit.itinerary): place.surface, h: TOUCH})
+        edit = Edit(renamed={(h - 1) % len(orbit.itinerary): location.surface, h: TOUCH})
         return Outcome(edit, {(h, -1): touch}, reason)
-    return Outcome(split(h, place.surface, (orbit.itinerary[h][0], TOUCH)), {(h, 0): touch}, reason)
+    return Outcome(
+        split(h, location.surface, (orbit.itinerary[h][0], TOUCH)), {(h, 0): touch}, reason
+    )
 
 
 def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
@@ -341,25 +345,25 @@ def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
         raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
 
 
-def _grazing_impact(orbit: Orbit, place: Test) -> Outcome:
+def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
     """GS at a reset: an impact of speed zero comes in, or goes."""
-    itinerary, i = orbit.itinerary, place.segment
+    itinerary, i = orbit.itinerary, location.segment
     mode, exit_ = itinerary[i]
-    if thrown_at(orbit, place):
+    if thrown_at(orbit, location):
         raise NotationError(
-            f"after the reset at {place.surface} motion starts somewhere else: no orbit is near"
+            f"after the reset at {location.surface} motion starts somewhere else: no orbit is near"
         )
-    if place.margin is Margin.INTERIOR:
-        edit = split(i, place.surface, (mode, exit_))
-        reason = f"impact at the touch of {place.surface} in segment {i + 1}"
-        return Outcome(edit, {(i, 0): touch_of(orbit, i, place.surface)}, reason)
+    if location.margin is Margin.INTERIOR:
+        edit = split(i, location.surface, (mode, exit_))
+        reason = f"impact at the touch of {location.surface} in segment {i + 1}"
+        return Outcome(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
     behind = (i + 1) % len(itinerary)
     whole = orbit.model.whole_mode
     if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(
             f"the impact after segment {i + 1} changes the mode: it cannot be left out"
         )
-    reason = f"no impact on {place.surface} after segment {i + 1}"
+    reason = f"no impact on {location.surface} after segment {i + 1}"
     if (
         itinerary[behind] in orbit.model.sections
     ):  # its mode says from which side the section is crossed
@@ -378,9 +382,9 @@ def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray)
 def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
     """Check that a state lies inside the region of a rest, not on its boundary."""
     model = orbit.model
-    place = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
+    location = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
     for domain in model.domains_of(rest):
-        if all(place[s] == sign for s, sign in domain.signs.items() if sign != 0):
+        if all(location[s] == sign for s, sign in domain.signs.items() if sign != 0):
             return
     raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
 

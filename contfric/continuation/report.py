@@ -10,7 +10,7 @@ from contfric.continuation.kinds import stands_still
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.split_touch import splits
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Test
+from contfric.orbit.system import EventFunction
 
 #: Accuracy of an event (relative to the range) where CS and AS, or the two ends of a slide, coincide: the
 #: root of rounding.
@@ -24,7 +24,7 @@ def bifurcation_at(
     after: Point | None,
     point: Point,
     settings: Settings,
-    tests: tuple[Test, ...] = (),
+    tests: tuple[EventFunction, ...] = (),
 ) -> Bifurcation:
     """Return the event at a point, with the stability of the points before and after it."""
     sides, least = (before, after), ROUGH if _is_rough(kind, here, tests) else 0.0
@@ -53,7 +53,7 @@ def _stability(
     return (second, first) if kind is not Kind.SN and ahead < before.value else (first, second)
 
 
-def _is_rough(kind: Kind, here: Orbit, tests: tuple[Test, ...]) -> bool:
+def _is_rough(kind: Kind, here: Orbit, tests: tuple[EventFunction, ...]) -> bool:
     """Tell whether an event is located to the root of rounding only: where the load stands still."""
     return kind in (Kind.CS, Kind.SS) and any(stands_still(here, test) for test in tests)
 

@@ -85,7 +85,7 @@ class Columns:
         before = back.take(name)[:0:-1]
         array, shift = self.take(name), len(before)
         array.resize((self.count + shift, *array.shape[1:]), refcheck=False)
-        for stop in range(self.count, 0, -_BLOCK):  # from the end, for the two places overlap
+        for stop in range(self.count, 0, -_BLOCK):  # from the end, for the two locations overlap
             start = max(0, stop - _BLOCK)
             array[start + shift : stop + shift] = array[start:stop]
         array[:shift] = before

@@ -13,7 +13,7 @@ from contfric.continuation.side import point_before
 from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import is_rate_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test, inside_sign
+from contfric.orbit.system import EventFunction, Margin, inside_sign
 from contfric.signature.holds import ends_rest, is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
@@ -161,7 +161,7 @@ def _hold_after(here: Orbit, first: int) -> int:
     hold = hold_of_test(tests[first], here)
     if hold is None:
         return first
-    return tests.index(Test(Margin.HELD, hold.segment, hold.leaves))
+    return tests.index(EventFunction(Margin.HELD, hold.segment, hold.leaves))
 
 
 def _grazed_wall(here: Orbit, point: Point, first: int) -> int:
@@ -211,7 +211,7 @@ def _grazed_limit(here: Orbit, point: Point, first: int) -> int:
     mode, exit_ = here.system.itinerary[tests[first].segment]
     if is_hold(exit_) or not is_rate_of(here.model, mode, exit_, tests[first].surface):
         return first
-    wanted = Test(Margin.EXIT, tests[first].segment, exit_)
+    wanted = EventFunction(Margin.EXIT, tests[first].segment, exit_)
     found = tests.index(wanted) if wanted in tests else first
     return found if abs(point.tests[found]) < _NEARLY_REACHED else first
 
@@ -222,7 +222,7 @@ def _located_before(
     """Return the margins violated at a located event: they vanish before it, and come back behind.
 
     Where several margins vanish together at a singular point, each is known there to the root of rounding,
-    and so is the tangent that trials are predicted with: they may end on another curve. A place at which
+    and so is the tangent that trials are predicted with: they may end on another curve. A location at which
     more of a margin is left than the event misses it by is such a jump, and no zero.
     """
     from contfric.continuation.bracket import BY_TEST
@@ -237,7 +237,7 @@ def _located_before(
     ]
 
 
-def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
+def _vanished_stick(here: Orbit, kind: Kind, test: EventFunction) -> EventFunction | None:
     """Return the stop (as a margin) of a stick that vanishes just where its release is tangential.
 
     CS and AS at once: the margin vanishes quadratically, and the orbit is one of a continuum (as at
@@ -255,13 +255,13 @@ def _vanished_stick(here: Orbit, kind: Kind, test: Test) -> Test | None:
         symmetry = here.model.symmetry
         if here.system.half and symmetry is not None:
             surface = {image: name for name, image in symmetry.surfaces.items()}[surface]
-    stop = Test(Margin.JOINT, segment, surface)
+    stop = EventFunction(Margin.JOINT, segment, surface)
     return (
         stop if stop in here.system.tests else None
     )  # of several contacts: another one cut it short
 
 
-def _is_at_least_load(here: Orbit, test: Test) -> bool:
+def _is_at_least_load(here: Orbit, test: EventFunction) -> bool:
     """Tell whether a stick is released where its load is least: it lasts no longer than that is known to."""
     mode, surface = here.itinerary[test.segment]
     if test.margin is not Margin.EXIT or surface not in here.model.surface_by_name:
@@ -298,7 +298,7 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     return replace(found, bound=max(found.accuracy, _NEARLY_REACHED))
 
 
-def _once(here: Orbit, group: tuple[Test, ...]) -> tuple[Test, ...]:
+def _once(here: Orbit, group: tuple[EventFunction, ...]) -> tuple[EventFunction, ...]:
     """Return the margins without joints whose exit is tangential: what is met there for that is one event."""
     tangential = {(t.segment, t.surface) for t in group if t.margin is Margin.EXIT}
     return tuple(
@@ -309,6 +309,6 @@ def _once(here: Orbit, group: tuple[Test, ...]) -> tuple[Test, ...]:
     )
 
 
-def _is_free(first: Test, other: Test) -> bool:
-    """Tell whether two vanishing margins are two events: not the same surface at the same place."""
+def _is_free(first: EventFunction, other: EventFunction) -> bool:
+    """Tell whether two vanishing margins are two events: not the same surface at the same location."""
     return (first.segment, first.surface) != (other.segment, other.surface)

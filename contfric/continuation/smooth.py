@@ -25,7 +25,7 @@ from contfric.continuation.side import first_point
 from contfric.continuation.told import NO_LENGTH, SAME_LOCATION, last_told
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
@@ -201,18 +201,18 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
     for k in range(len(before.labels)):
         if before.labels[k] == after.labels[k]:
             continue
-        places = locate_label(orbit, before, after, settings, k)
-        if len(places) > 1 and places[1].arc - places[0].arc < SAME_LOCATION:
-            places.pop()
-        if not places and not (
+        locations = locate_label(orbit, before, after, settings, k)
+        if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
+            locations.pop()
+        if not locations and not (
             _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
         ):
             found.append(not_located(orbit, Kind.T, before, after, settings))
-        for point in places:
+        for point in locations:
             here = point.orbit(orbit.system, orbit.vector, active)
             if here.margins.min(initial=0.0) < -_OUTSIDE:
                 continue  # where curves cross a trial may lie on another one
-            test = Test(*_label_location(orbit, k))
+            test = EventFunction(*_label_location(orbit, k))
             b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
             found.append((b, point))
     return _once(found) if orbit.model.joined else found
@@ -244,7 +244,7 @@ def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
 
 
 def _once(found: list[Located]) -> list[Located]:
-    """Return one tangency of those in one place: where a joint on a section is, is of no importance."""
+    """Return one tangency of those in one location: where a joint on a section is, is of no importance."""
     kept: list[Located] = []
     for event in sorted(found, key=lambda pair: pair[1].arc):
         if not kept or event[1].arc - kept[-1][1].arc > SAME_TANGENCY:

@@ -1,7 +1,7 @@
 """Where the touch that a hold is pinned to splits into two of equal height.
 
 A stick ends where its load u touches the limit, and a hold goes on. The touch is a maximum, ``u' = 0``. Under
-an even excitation it may lie where u is even in time: with e the distance of the parameter from the place
+an even excitation it may lie where u is even in time: with e the distance of the parameter from the location
 where its curvature vanishes, and t the time from there,
 
     u' = e t - c t^3:
@@ -24,10 +24,10 @@ from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.zero_acceleration import joint_within
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, System, Test
+from contfric.orbit.system import EventFunction, Margin, System
 
 #: Share of the times of pins that all other joints move by where nothing but these moves. At a fold they all
-#: move alike; near the place where a touch splits they move by less than the distance from it.
+#: move alike; near the location where a touch splits they move by less than the distance from it.
 _ALONE = 1e-4
 #: Share of the period over which the curvature of a load is measured; and how near to each other two maxima
 #: count as one, in these: where a margin is violated by rounding.
@@ -54,7 +54,7 @@ def as_split(found: Bifurcation, tangent: FloatArray) -> Bifurcation | None:
     rest = np.delete(moved, pins)
     if not pins or np.max(rest, initial=0.0) > _ALONE * moved[pins].max():
         return None
-    tests = tuple(Test(Margin.INTERIOR, k, system.itinerary[k - 1][1]) for k in pins)
+    tests = tuple(EventFunction(Margin.INTERIOR, k, system.itinerary[k - 1][1]) for k in pins)
     known = tuple(test for test in tests if test in system.tests)
     return replace(found, kind=Kind.AS, tests=known) if known else None
 

@@ -15,7 +15,7 @@ from contfric.continuation.touching import rate_along
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, drop
 from contfric.signature.holds import is_hold
 
@@ -33,7 +33,7 @@ def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     mode, exit_ = orbit.itinerary[i]
     if not orbit.model.filippov or is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:
         return False
-    at_end = Test(Margin.EXIT, i, exit_)
+    at_end = EventFunction(Margin.EXIT, i, exit_)
     if orbit.itinerary[i - 1][1] != exit_ or at_end not in orbit.system.tests:
         return False
     left = abs(float(orbit.margins[orbit.system.tests.index(at_end)]))

@@ -1,6 +1,6 @@
 """A branch that ends where a quantity takes a value: between which points, and where exactly.
 
-Between two points at which the quantity lies on both sides of the value the place is located by Brent's
+Between two points at which the quantity lies on both sides of the value the location is located by Brent's
 method, each trial a solved orbit. Where it comes near and goes away again, the cubic through values and
 slopes of both ends of a step says whether it reaches the value between them; the solved orbit at the
 extremum of that cubic decides.
@@ -80,7 +80,7 @@ class _Sought:
         return found.mirror() if self.mirrored else found
 
     def crossing(self, before: Point, after: Point) -> Stop | None:
-        """Return the place between two points on both sides of the value."""
+        """Return the location between two points on both sides of the value."""
         last = before
 
         def miss_at(point: Point) -> float:
@@ -97,7 +97,7 @@ class _Sought:
 
 
 def stop_between(orbit: Orbit, before: Point, after: Point, settings: Settings) -> Stop | None:
-    """Return the first place of a step at which a quantity takes the value to stop at; None if none does."""
+    """Return the first location of a step at which a quantity takes the value to stop at, or None."""
     stops = [
         _reached(sought, before, after, sought.miss(before), sought.miss(after), may_dip=True)
         for sought in _all_sought(orbit, settings)

@@ -35,8 +35,8 @@ _CORNER, _NO_CHANGE = 1e-3, 1e-11
 
 
 @dataclass(frozen=True, eq=False)
-class Departure:
-    """A place and direction to start a branch from, and what it comes from.
+class BranchStart:
+    """A location and direction to start a branch from, and what it comes from.
 
     ``origin`` is the orbit at the event itself, the first point of the new branch.
     """
@@ -60,7 +60,7 @@ def null_vector(orbit: Orbit) -> FloatArray:
 
 def leave_branch_point(
     orbit: Orbit, settings: Settings, reason: str, distance: float = LEAVE
-) -> Departure | None:
+) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit along its null vector."""
     return leave_along(orbit, settings, Direction(null_vector(orbit), 0.0), reason, distance)
 
@@ -68,7 +68,7 @@ def leave_branch_point(
 @foreseeable()
 def leave_along(
     orbit: Orbit, settings: Settings, direction: Direction, reason: str, distance: float = LEAVE
-) -> Departure | None:
+) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
     origin = first_point(orbit, settings)
     vector = orbit.vector.copy()
@@ -86,13 +86,13 @@ def leave_along(
         origin = replace(point)
     origin.joints, origin.w = orbit.joints, np.array([settings_value(orbit, settings)])
     point.arc = distance
-    return Departure(orbit, point, origin, reason)
+    return BranchStart(orbit, point, origin, reason)
 
 
 def overshoots(
     orbit: Orbit,
     settings: Settings,
-    departure: Departure,
+    departure: BranchStart,
     distance: float,
     direction: Direction | None = None,
 ) -> bool:
@@ -110,7 +110,7 @@ def overshoots(
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]
     if watched[0] * watched[1] < 0.0:
         return True
-    if not orbit.model.kinks:  # a corner would be the error of the event's own place
+    if not orbit.model.kinks:  # a corner would be the error of the event's own location
         return False
     at = settings_value(orbit, settings)
     far, near = departure.point.value - at, nearer.point.value - at

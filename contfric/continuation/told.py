@@ -30,7 +30,7 @@ from contfric.orbit.orbit import Orbit
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
 SAME_LOCATION = 1e-7
-#: The same for a place known by its parameter (relative to the range), which is stationary at a fold.
+#: The same for a location known by its parameter (relative to the range), which is stationary at a fold.
 SAME_VALUE, SAME_FOLD = 1e-9, 1e-4
 #: A segment this short has no length: an event at which it comes in is located to the root of rounding.
 NO_LENGTH = 1e-6
@@ -104,8 +104,8 @@ def _point_at(
 ) -> Point | None:
     """Solve for the point at a distance before an event; None if Newton goes astray.
 
-    It is predicted by the parabola through both places with the tangent at the first one: that at the event
-    is rounding, or that of another curve.
+    It is predicted by the parabola through both locations with the tangent at the first one: that at the
+    event is rounding, or that of another curve.
     """
     length = event.arc - before.arc
     s = length - back

@@ -13,7 +13,7 @@ from contfric.models.definition import Domain, Model
 from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import is_section
-from contfric.orbit.system import Margin, System, Test
+from contfric.orbit.system import EventFunction, Margin, System
 
 #: A rate this small, at a joint on a section that is a rate itself, is rounding.
 _TANGENTIAL = 1e-9
@@ -23,7 +23,7 @@ _PASSED = 1e-4
 _STATES = 6
 
 
-def touched_at_joint(system: System, test: Test, orbit: Orbit) -> str | None:
+def touched_at_joint(system: System, test: EventFunction, orbit: Orbit) -> str | None:
     """Return the surface that is touched where two are met at a joint; None if that is a corner of them.
 
     A slider that begins to slip reaches its limit where its velocity vanishes, and that may be the section:
@@ -46,7 +46,7 @@ def touched_at_joint(system: System, test: Test, orbit: Orbit) -> str | None:
     return None
 
 
-def is_corner(system: System, test: Test, orbit: Orbit) -> bool:
+def is_corner(system: System, test: EventFunction, orbit: Orbit) -> bool:
     """Tell whether two surfaces are met at once at a joint, each with a speed: neither is only touched."""
     if test.margin is not Margin.JOINT:
         return False
@@ -54,7 +54,7 @@ def is_corner(system: System, test: Test, orbit: Orbit) -> bool:
     return abs(rate_along(orbit, mode, test.surface, orbit.ends[test.segment])) > _PASSED
 
 
-def resting_domain(system: System, test: Test) -> Domain | None:
+def resting_domain(system: System, test: EventFunction) -> Domain | None:
     """Return the domain of rest that a joint is next to, which the surface of a test ends; None if none.
 
     Where the surface is that of another contact, whose state changes at the same time, the rest goes on.
@@ -123,7 +123,7 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
     return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])
 
 
-def chosen_at(system: System, test: Test) -> str:
+def chosen_at(system: System, test: EventFunction) -> str:
     """Return the surface of the reset that chooses the mode after it by the side of a test; else nothing."""
     joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
     mode, exit_ = system.itinerary[joint % len(system.itinerary)]
@@ -132,7 +132,7 @@ def chosen_at(system: System, test: Test) -> str:
     return exit_ if chooses and test.margin in (Margin.JOINT, Margin.ENTRY) else ""
 
 
-def entered_at(system: System, test: Test) -> str:
+def entered_at(system: System, test: EventFunction) -> str:
     """Return the mode that a touch of its surface leads into for good; else nothing.
 
     A mode that holds on both sides of the surface overlaps the one before it: motion that just crosses stays
@@ -153,7 +153,7 @@ def entered_at(system: System, test: Test) -> str:
     return ""
 
 
-def thrown_at(orbit: Orbit, test: Test) -> str:
+def thrown_at(orbit: Orbit, test: EventFunction) -> str:
     """Return the surface of a reset that takes what just touches it somewhere else; else nothing.
 
     An impact changes nothing at a touch, as ``v -> -e v`` at v = 0. A reset off its surface does, and so does
@@ -172,7 +172,7 @@ def thrown_at(orbit: Orbit, test: Test) -> str:
     return test.surface if moved > _PASSED * (1.0 + np.max(np.abs(touch[1:]))) else ""
 
 
-def leads_elsewhere(orbit: Orbit, test: Test) -> bool:
+def leads_elsewhere(orbit: Orbit, test: EventFunction) -> bool:
     """Tell whether nothing lies between the solutions on both sides of an event.
 
     So it is where a reset takes what touches it somewhere else, where a reset chooses another mode, and where

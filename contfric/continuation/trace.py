@@ -147,9 +147,9 @@ def trace_side(
 ) -> Side:
     """Follow a branch from a point along its tangent until it ends.
 
-    ``at_event`` says that the point is at a sliding event, to which smooth events in the same place belong.
-    With ``keep`` Ctrl-C ends the side where it is, with the reason INTERRUPTED. Without it is passed on: who
-    traces sides one after the other must not take the end of one for an answer.
+    ``at_event`` says that the point is at a sliding event, to which smooth events in the same location
+    belong. With ``keep`` Ctrl-C ends the side where it is, with the reason INTERRUPTED. Without it is passed
+    on: who traces sides one after the other must not take the end of one for an answer.
     """
     side = Side.starting(start, orbit.system, End(EndReason.START), settings.stability)
     side.at_event = at_event

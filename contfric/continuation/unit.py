@@ -182,11 +182,11 @@ def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
 def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: Piece, reason: str) -> Form:
     """Return one unit of a whole orbit as a form, as the first unit of the motion."""
     count = len(orbit.itinerary)
-    places = [i % count for i in piece.segments]
-    joints = orbit.cycle[places]
+    locations = [i % count for i in piece.segments]
+    joints = orbit.cycle[locations]
     joints[:, 0] += np.array([orbit.period * (i // count) for i in piece.segments])
     joints[:, 0] += unit.cut[0] + piece.number * unit.duration - joints[0, 0]
-    return Form(piece.itinerary, unit.image(joints, -piece.number), away[places], reason, unit)
+    return Form(piece.itinerary, unit.image(joints, -piece.number), away[locations], reason, unit)
 
 
 def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:

@@ -2,8 +2,8 @@
 
 Without damping, at Omega = 1/2, slides last whole natural periods whatever their amplitude: orbits without
 sticks are a family at this one value (:mod:`contfric.continuation.continuum`). Let z be the joints, F = 0 the
-equations, a the place along the family and b the distance of the parameter from its value. By the method of
-Lyapunov and Schmidt one equation is left, and it begins with the square,
+equations, a the location along the family and b the distance of the parameter from its value. By the method
+of Lyapunov and Schmidt one equation is left, and it begins with the square,
 
     ``g(a, b) = c(a) b^2 + ...``,
 

@@ -123,10 +123,10 @@ def passed_vertex(system: System, joints: FloatArray, first: int = 0) -> tuple[i
     fallen = (size[1:] < _ODD**2) & (size[:-1] > (10.0 * _ODD) ** 2)
     # in short steps the odd part is gone little by little
     gone = (size[1:] < EVEN**2) & (np.maximum.accumulate(size[:-1]) > (100.0 * EVEN) ** 2)
-    places = first + np.flatnonzero((turned | fallen | gone)[first:])
-    if not len(places):
+    locations = first + np.flatnonzero((turned | fallen | gone)[first:])
+    if not len(locations):
         return None
-    k = int(places[0])
+    k = int(locations[0])
     if not turned[k]:
         return k, float(np.inf if fallen[k] else -np.inf)
     if known[k] == k:

@@ -1,6 +1,6 @@
 """Where a solution at rest could just not be left any more, and where a segment touches a surface.
 
-Both are places on one known segment, looked for once an event.
+Both are locations on one known segment, looked for once an event.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ def first_zero_acceleration(orbit: Orbit, i: int, start: float, departs: str) ->
     """
     rate = _departure_rate(orbit, i, departs)
     end = float(orbit.ends[i, 0])
-    places = [t for t in _stationary(orbit, i) if start < t < end]
+    locations = [t for t in _stationary(orbit, i) if start < t < end]
     grid = sorted(
         {
             float(time)
-            for a, b in pairwise([start, *places, end])
+            for a, b in pairwise([start, *locations, end])
             for time in np.linspace(a, b, _PIECES + 1)
         }
     )

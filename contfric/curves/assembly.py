@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None) -> Curve:
     """Return one curve from the two sides of its start, or from one that begins at ``first``."""
     pieces = _pieces(ahead)
-    place = None if first is None else first.special
+    location = None if first is None else first.special
     first = first or CurveEnd(CurveEndReason.CLOSED)
-    if place is not None:
+    if location is not None:
         pieces[0] = replace(pieces[0])
-        at = replace(place, position=pieces[0].points[0].arc)
+        at = replace(location, position=pieces[0].points[0].arc)
         pieces[0].special = [at, *pieces[0].special]
     if behind is not None:
         back = _pieces(behind)
@@ -41,8 +41,8 @@ def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | Non
     moved = tuple(replace(s, position=s.position + shift) for s in special)
     parts = [part for piece in pieces for part in _parts(piece.problem, piece.points, shift, moved)]
     ends = tuple(
-        end if end.special is None else replace(end, special=moved[place])
-        for end, place in ((first, 0), (_pieces(ahead)[-1].end, -1))
+        end if end.special is None else replace(end, special=moved[location])
+        for end, location in ((first, 0), (_pieces(ahead)[-1].end, -1))
     )
     problem = ahead.problem
     return Curve(problem.box.names, problem.vector, tuple(parts), moved, (ends[0], ends[1]))

@@ -15,11 +15,11 @@ from contfric.continuation.geometry import PointsType
 from contfric.continuation.steps import AT_EVENT, EXTRA
 from contfric.curves.correct import CurveProblemType, along_curve, correct_curve, observe_curve
 
-#: Share of a step to which a place is bracketed.
+#: Share of a step to which a location is bracketed.
 _RESOLUTION = 4e-16
 #: Values below this are rounding: a narrower bracket would follow noise.
 _NOISE = 2e-15
-#: What is left at a place that counts as found.
+#: What is left at a location that counts as found.
 _FOUND = 1e-6
 #: A margin without stationary points is infinite: this is as good, and fit for interpolation.
 _LARGE = 1e3
@@ -55,7 +55,7 @@ _bracket = bracketing(correct_curve, observed_value)
 
 @kernel(types.Tuple((i8, f8))(CurveProblemType, blocks, SoughtType, PointsType, indices))
 def locate_on_curve(problem, border, sought, points, counts):  # type: ignore[no-untyped-def]
-    """Find where a value changes sign between rows 0 and 1 of the points; the place is left in row 3.
+    """Find where a value changes sign between rows 0 and 1 of the points; the location is left in row 3.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from contfric.curves.special import CurveEnd, SpecialPoint
 from contfric.errors import either
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray, System, Test
+from contfric.orbit.system import EventFunction, IntArray, System
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,7 +56,7 @@ class CurvePart:
     kind: Kind
     problem: Problem | None
     system: System
-    test: Test | None
+    test: EventFunction | None
     values: FloatArray
     joints: FloatArray
     arc: FloatArray

@@ -4,9 +4,9 @@ With the parameters :math:`p_1, \dots, p_q` the conditions are
 
 .. math:: \frac{dQ}{dp_k} = 0, \qquad k = 1, \dots, q - 1 ,
 
-the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`). With q = 2 it is the place
-of a resonance peak as the last parameter varies, with q = 3 the place where that peak is stationary in a
-second parameter.
+the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`). With q = 2 it is the
+location of a resonance peak as the last parameter varies, with q = 3 the location where that peak is
+stationary in a second parameter.
 
 Values are exact. Of an extremum over the orbit all of it is compiled (:mod:`contfric.curves.lagrangian`).
 Of any other quantity the slopes of the conditions are central differences at the start, and from then on

@@ -26,7 +26,7 @@ from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical, moved
-from contfric.orbit.system import IntArray, Margin, Test
+from contfric.orbit.system import EventFunction, IntArray, Margin
 from contfric.remember.journal import remembered
 
 #: Times of a joint in two itineraries for one motion agree to this (nondimensional): located events are good
@@ -47,15 +47,15 @@ _NO_TIME = 1e-9
 Start = tuple[Problem, Point, FloatArray]
 
 
-def place_of(orbit: Orbit, test: Test) -> tuple[float, str]:
+def location_of(orbit: Orbit, test: EventFunction) -> tuple[float, str]:
     """Return when and on which surface a margin of an orbit vanishes."""
     if test.margin is not Margin.INTERIOR:
         return float(orbit.ends[test.segment, 0]), test.surface
     return _touch_time(orbit, test), test.surface
 
 
-def _tangent_at(orbit: Orbit, test: Test) -> Test:
-    """Return the margin at the place of a tangency, whose test names the observable only.
+def _tangent_at(orbit: Orbit, test: EventFunction) -> EventFunction:
+    """Return the margin at the location of a tangency, whose test names the observable only.
 
     Raises
     ------
@@ -64,13 +64,13 @@ def _tangent_at(orbit: Orbit, test: Test) -> Test:
     """
     from contfric.curves.conditions import JOINT, START
 
-    place, segment, surface = tangency(orbit, test)
-    if place == START:  # the joint is the end of the segment before it
-        return Test(Margin.JOINT, (segment - 1) % len(orbit.itinerary), surface)
-    return Test(Margin.JOINT if place == JOINT else Margin.INTERIOR, segment, surface)
+    location, segment, surface = tangency(orbit, test)
+    if location == START:  # the joint is the end of the segment before it
+        return EventFunction(Margin.JOINT, (segment - 1) % len(orbit.itinerary), surface)
+    return EventFunction(Margin.JOINT if location == JOINT else Margin.INTERIOR, segment, surface)
 
 
-def _touch_time(orbit: Orbit, test: Test) -> float:
+def _touch_time(orbit: Orbit, test: EventFunction) -> float:
     """Return the time at which an observable is stationary nearest to a surface inside a segment."""
     i, observable = test.segment, orbit.model.surface_by_name[test.surface].observable
     start = orbit.begins[i]
@@ -84,10 +84,10 @@ def _touch_time(orbit: Orbit, test: Test) -> float:
     return float(begin + times[int(np.argmin(np.abs(values - level)))])
 
 
-def same_location(one: Orbit, a: Test, other: Orbit, b: Test) -> bool:
-    """Tell whether margins of two itineraries for one solution vanish at one place, or its mirror image."""
-    time, surface = place_of(one, a)
-    there, on = place_of(other, b)
+def same_location(one: Orbit, a: EventFunction, other: Orbit, b: EventFunction) -> bool:
+    """Tell whether margins of two itineraries for one solution vanish at one location, up to symmetry."""
+    time, surface = location_of(one, a)
+    there, on = location_of(other, b)
     period = one.period
     gap = abs((time - there + 0.5 * period) % period - 0.5 * period)
     if on == surface and gap < _SAME_TIME:
@@ -132,20 +132,20 @@ def again(problem: Problem, special: SpecialPoint, orbit: Orbit) -> Bifurcation 
     return None
 
 
-def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
+def _tangency_again(test: EventFunction, one: Orbit, other: Orbit) -> Bifurcation | None:
     """Return the tangency of a solution in another itinerary for it; None where no segment of it touches."""
     try:
-        place = _tangent_at(one, test)
+        location = _tangent_at(one, test)
     except ParameterError:
         return None
     observables = [o.name for o in other.model.observables]
     for segment, observable, *_ in other.system.layout.labels:
-        touch = Test(Margin.INTERIOR, int(segment), observables[int(observable)])
+        touch = EventFunction(Margin.INTERIOR, int(segment), observables[int(observable)])
         try:
             there = _tangent_at(other, touch)
         except ParameterError:
             continue
-        if same_location(one, place, other, there):
+        if same_location(one, location, other, there):
             return Bifurcation(Kind.T, other.params, other, (touch,))
     return None
 
@@ -154,7 +154,7 @@ def _tangency_again(test: Test, one: Orbit, other: Orbit) -> Bifurcation | None:
 def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float) -> Start | None:
     """Return where a curve goes on after a sliding event, in the direction that it has; None if nowhere.
 
-    What goes on happens at as many places as before: a curve that is asymmetric does not go on as the
+    What goes on happens at as many locations as before: a curve that is asymmetric does not go on as the
     symmetric one that it has met.
     """
     ahead = tip.direction / problem.box.widths
@@ -164,12 +164,12 @@ def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float)
             continue
         for start in starts_of(event, problem.box, largest):
             forward = float(np.sum(start[1].direction / problem.box.widths * ahead)) > 0.0
-            if forward and _places(start[0]) == _places(problem):
+            if forward and _locations(start[0]) == _locations(problem):
                 return start
     return None
 
 
-def _places(problem: Problem) -> int:
+def _locations(problem: Problem) -> int:
     """Return the number of places of the whole orbit at which a curve's event happens."""
     return len(problem.condition.pinned) * (2 if problem.system.half else 1)
 

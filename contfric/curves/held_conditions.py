@@ -16,7 +16,12 @@ from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
 from contfric.continuation.geometry import copy_to, copy_vector
-from contfric.curves.lagrangian import add_bend, differentiated_extreme, place_found, quantity_row
+from contfric.curves.lagrangian import (
+    add_bend,
+    differentiated_extreme,
+    location_found,
+    quantity_row,
+)
 from contfric.handle import HandleType
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import LayoutType, close_chain
@@ -100,7 +105,7 @@ def fill_conditions(way, z):  # type: ignore[no-untyped-def]
     if conditions.kind == CALLED:
         return call_conditions(way, z)
     if conditions.kind == AT_VALUE:
-        if not place_found(way, z):
+        if not location_found(way, z):
             return np.nan
         values[0] = quantity_row(way, z, d[1], e[1]) - conditions.value
         return abs(values[0])

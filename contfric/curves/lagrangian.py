@@ -28,7 +28,7 @@ from contfric.curves.bending import DIFFERENCE
 from contfric.curves.chain import chain_solve, fill_blocks, set_border
 from contfric.models.definition import FloatArray
 from contfric.orbit.equations import close_chain, segment_rows
-from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_place
+from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_location
 
 
 class LagrangianWorkspace(NamedTuple):
@@ -67,17 +67,17 @@ def lagrangian_workspace(count, whole, m, free):  # type: ignore[no-untyped-def]
 
 
 @helper
-def place_found(way, z):  # type: ignore[no-untyped-def]
-    """Tell whether the extremum has a place on the orbit, which is noted."""
+def location_found(way, z):  # type: ignore[no-untyped-def]
+    """Tell whether the extremum has a location on the orbit, which is noted."""
     stationary = way.workspace.stationary
-    return find_place(
+    return find_location(
         way.functions, way.layout, way.held.extreme, z, way.p, way.own.extreme, stationary
     )
 
 
 @helper
 def quantity_row(way, z, on_joints, on_parameters):  # type: ignore[no-untyped-def]
-    """Return Q at the place that was found, and write Q'."""
+    """Return Q at the location that was found, and write Q'."""
     equations, stationary = way.workspace.equations, way.workspace.stationary
     return extreme_row(
         way.functions,
@@ -157,7 +157,7 @@ def differentiated_extreme(way, z):  # type: ignore[no-untyped-def]
     The closure of the chain is in the workspace, and is again. NaN where the orbit has no derivative.
     """
     workspace, own, turned = way.workspace, way.own, z.shape[0] > 0  # a flag, but no literal
-    if not fill_blocks(way, z) or not place_found(way, z):
+    if not fill_blocks(way, z) or not location_found(way, z):
         return np.nan
     on_joints, on_parameters = own.on_joints[0], own.on_parameters[0]
     quantity_row(way, z, on_joints, on_parameters)

@@ -40,7 +40,7 @@ from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: Distances near a degenerate point at which the curve that leaves is started: as for branches.
 _BESIDE = (1e-2, 3e-3, 1e-3)
@@ -68,7 +68,7 @@ def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator
 
 def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
     """Yield the curves of all margins that vanish at a point, in all itineraries for the solution there."""
-    seen: set[tuple[int, Test]] = set()  # systems are built once each
+    seen: set[tuple[int, EventFunction]] = set()  # systems are built once each
     for orbit in (special.orbit, *itineraries_at(special), *_itineraries_of_own(special, problem)):
         for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
             if not abs(value) < _VANISHES or (id(orbit.system), test) in seen:
@@ -193,7 +193,7 @@ def _tangential_release(special: SpecialPoint, problem: Problem, largest: float)
         and abs(edited.ends[i, 0] - edited.cycle[i, 0]) < _VANISHES
     ]
     for i in sticks:
-        test = Test(Margin.EXIT, i, edited.system.itinerary[i][1])
+        test = EventFunction(Margin.EXIT, i, edited.system.itinerary[i][1])
         try:
             own = problem_of(Bifurcation(Kind.AS, edited.params, edited, (test,)), problem.box)
         except ContfricError:

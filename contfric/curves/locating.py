@@ -1,7 +1,7 @@
 """Points of codimension two between two points of a curve: bracketed to the resolution of the arithmetic.
 
 Each trial is predicted by the cubic through both ends of the step and corrected normal to the tangent between
-them; its watched value decides on which side the place is.
+them; its watched value decides on which side the location is.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from contfric.models.definition import FloatArray
 if TYPE_CHECKING:
     from contfric.continuation.bracket import Sought
 
-#: Share of a step to which a place is bracketed: the resolution of the arithmetic.
+#: Share of a step to which a location is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
 #: Rounding of a number.
 _ROUNDING = float(np.finfo(float).eps)
@@ -45,9 +45,9 @@ def point_between(
 def locate_zero(
     problem: Conditioned, a: Point, b: Point, border: FloatArray, value: Value
 ) -> tuple[Point, bool]:
-    """Return the place where a value changes sign, and whether it is bracketed to its last digits.
+    """Return the location where a value changes sign, and whether it is bracketed to its last digits.
 
-    By Brent's method. A trial that is not solved counts as beyond the place, and so does the far end.
+    By Brent's method. A trial that is not solved counts as beyond the location, and so does the far end.
     """
     from scipy.optimize import brentq
 
@@ -76,7 +76,7 @@ def locate_zero(
 def locate(
     problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
 ) -> tuple[Point, bool]:
-    """Return the place of a change, and whether it is bracketed to its last digits; compiled."""
+    """Return the location of a change, and whether it is bracketed to its last digits; compiled."""
     from contfric.curves.bracket import locate_on_curve
 
     rows = Rows.empty(problem.system, 4, 2)
@@ -101,7 +101,7 @@ def by_label(row: int, before: int) -> Sought:
     return sought_of(BY_LABEL, row, float(before))
 
 
-def by_place(planes: FloatArray) -> Sought:
+def by_location(planes: FloatArray) -> Sought:
     """Return the search for where the least of ``a p + b q + c`` vanishes."""
     from contfric.continuation.bracket import BY_PARAMETER
 

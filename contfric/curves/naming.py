@@ -14,7 +14,7 @@ from contfric.curves.locating import by_label, by_test, locate
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.models.definition import FloatArray
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 #: A multiplier this far from the real axis belongs to a complex pair.
 _COMPLEX = 1e-6
@@ -82,7 +82,7 @@ def _margins(problem: Problem, before: Point, after: Point, border: FloatArray) 
     return [Crossing(point, special, True)]
 
 
-def _rest(group: tuple[Test, ...], first: Test) -> tuple[Test, ...]:
+def _rest(group: tuple[EventFunction, ...], first: EventFunction) -> tuple[EventFunction, ...]:
     return tuple(test for test in group if test != first)
 
 
@@ -91,7 +91,7 @@ def _special(
     point: Point,
     kind: CodimTwo,
     meets: Kind | None = None,
-    tests: tuple[Test, ...] = (),
+    tests: tuple[EventFunction, ...] = (),
     located: bool = True,
 ) -> SpecialPoint:
     orbit = problem.orbit(point.joints, point.w)
@@ -161,7 +161,7 @@ def _labels(problem: Problem, before: Point, after: Point, border: FloatArray) -
     for k in np.flatnonzero(before.labels != after.labels):
         old = int(before.labels[k])
         point, _ = locate(problem, before, after, border, by_label(int(k), old))
-        test = Test(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
+        test = EventFunction(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(Crossing(point, special, False))
     return found

@@ -16,7 +16,7 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray, Margin, System, Test
+from contfric.orbit.system import EventFunction, IntArray, Margin, System
 
 if TYPE_CHECKING:
     from contfric.curves.conditions import Condition
@@ -48,7 +48,7 @@ class Problem:
     vector: FloatArray
     box: Box
     condition: Condition
-    test: Test | None
+    test: EventFunction | None
 
     @property
     def model(self) -> Model:
@@ -156,7 +156,7 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
         raise ParameterError(f"{bifurcation!r} does not say which margin vanishes")
     test = _chosen(bifurcation)
     if kind is Kind.T:
-        place, segment, surface = tangency(orbit, test)
+        location, segment, surface = tangency(orbit, test)
     else:
         if test not in system.tests:
             raise ParameterError(f"{bifurcation!r}: its orbit has no margin {test}")
@@ -165,21 +165,21 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Proble
             raise ParameterError(
                 f"{bifurcation!r} is no bifurcation: its margin is {margin:.3g}, not zero"
             )
-        places = {
+        locations = {
             Margin.JOINT: JOINT,
             Margin.EXIT: EXIT,
             Margin.INTERIOR: INTERIOR,
             Margin.ENTRY: START,
         }
-        place, segment, surface = places[test.margin], test.segment, test.surface
+        location, segment, surface = locations[test.margin], test.segment, test.surface
         if test not in bifurcation.tests:
             kind = kind_of_margin(system, test, orbit)
     pinned = [] if kind is Kind.T else _vanishing(orbit)
     rest = -1
-    if kind in (Kind.CS, Kind.SS) and place == JOINT:
+    if kind in (Kind.CS, Kind.SS) and location == JOINT:
         rest = _rest_mode(system, test)
     condition = Condition(
-        place,
+        location,
         segment,
         model.surface_index[surface],
         1.0,
@@ -194,7 +194,7 @@ def _vanishing(orbit: Orbit) -> list[int]:
     return [int(k) for k in np.flatnonzero(np.abs(orbit.margins) < _VANISHES)]
 
 
-def _chosen(bifurcation: Bifurcation) -> Test:
+def _chosen(bifurcation: Bifurcation) -> EventFunction:
     """Return the margin of an event that its curve follows: one at a joint whose exit is not tangential.
 
     Where nothing jumps a stop without acceleration is one at which the load is on its limit, and an
@@ -208,7 +208,7 @@ def _chosen(bifurcation: Bifurcation) -> Test:
     return plain or exits[0] or tests[0]
 
 
-def _tangential(test: Test, orbit: Orbit) -> Test | None:
+def _tangential(test: EventFunction, orbit: Orbit) -> EventFunction | None:
     """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
     model, itinerary = orbit.model, orbit.system.itinerary
     if test.margin is not Margin.JOINT or not (
@@ -223,7 +223,7 @@ def _tangential(test: Test, orbit: Orbit) -> Test | None:
     return next(exits, None)
 
 
-def _rest_mode(system: System, test: Test) -> int:
+def _rest_mode(system: System, test: EventFunction) -> int:
     """Return the mode of rest whose rate at a stop tells CS from SS; -1 where there is no rest."""
     resting = resting_domain(system, test)
     if resting is None:
@@ -231,7 +231,7 @@ def _rest_mode(system: System, test: Test) -> int:
     return system.model.mode_index[resting.mode]
 
 
-def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntArray:
+def _quiet(system: System, kind: Kind, segment: int, pinned: list[EventFunction]) -> IntArray:
     """Return the rows of labels that say nothing along the curve: a joint lies on the surface."""
     count = system.segments
     near = {segment} if kind is Kind.T else set()
@@ -241,8 +241,8 @@ def _quiet(system: System, kind: Kind, segment: int, pinned: list[Test]) -> IntA
     return np.array(rows, dtype=np.int64)
 
 
-def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
-    """Return (place, segment, surface) of a tangency: where an observable is nearest to a surface."""
+def tangency(orbit: Orbit, test: EventFunction) -> tuple[int, int, str]:
+    """Return (location, segment, surface) of a tangency: where an observable is nearest to a surface."""
     from contfric.curves.conditions import INTERIOR, JOINT, START
 
     model, segment = orbit.model, test.segment
@@ -256,14 +256,14 @@ def tangency(orbit: Orbit, test: Test) -> tuple[int, int, str]:
     for surface in named:
         level = orbit.flow.level(surface.name)
         reached += [(abs(v - level), INTERIOR, surface.name) for v in values]
-        for place, (joint, on) in ends.items():
+        for location, (joint, on) in ends.items():
             if on != surface.name:
                 value = orbit.flow.observe(test.surface, float(joint[0]), joint[1:])
-                reached.append((abs(value - level), place, surface.name))
-    gap, place, name = min(reached)
+                reached.append((abs(value - level), location, surface.name))
+    gap, location, name = min(reached)
     if gap > _VANISHES:
         raise ParameterError(f"there is no tangency in segment {segment + 1}: the gap is {gap:.3g}")
-    return place, segment, name
+    return location, segment, name
 
 
 def border_of(problem: Problem, joints: FloatArray, vector: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.continuation.points import Point
 from contfric.curves.births import birth_between
-from contfric.curves.locating import by_place, locate
+from contfric.curves.locating import by_location, locate
 from contfric.curves.naming import crossings
 from contfric.curves.problem import Problem
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
@@ -70,7 +70,7 @@ def end_at_birth(side: CurveSide, fresh: list[Point], at: int) -> bool:
 def end_at_limit(side: CurveSide, after: Point) -> bool:
     """End a side where the model's parameters end."""
     problem = side.problem
-    point, _ = locate(problem, side.tip, after, side.border, by_place(problem.limits))
+    point, _ = locate(problem, side.tip, after, side.border, by_location(problem.limits))
     if point is not side.tip:
         side.points.append(point)
     side.end = CurveEnd(CurveEndReason.LIMIT)
@@ -112,5 +112,5 @@ def _range_crossed(side: CurveSide, after: Point) -> Point | None:
     inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
     if np.min(inside) <= 0.0:
         return before
-    point, _ = locate(side.problem, before, after, side.border, by_place(box.edges))
+    point, _ = locate(side.problem, before, after, side.border, by_location(box.edges))
     return point

@@ -8,7 +8,7 @@ from enum import Enum
 from contfric.base.shown import Shown
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Test
+from contfric.orbit.system import EventFunction
 
 
 class CodimTwo(str, Enum):
@@ -73,7 +73,7 @@ class SpecialPoint(Shown):
     position : float
         Arclength on the curve.
     located : bool
-        False if the test changed sign but the place could not be bracketed to its last digits.
+        False if the test changed sign but the location could not be bracketed to its last digits.
     """
 
     kind: CodimTwo
@@ -81,7 +81,7 @@ class SpecialPoint(Shown):
     params: dict[str, float]
     orbit: Orbit
     meets: Kind | None = None
-    tests: tuple[Test, ...] = ()
+    tests: tuple[EventFunction, ...] = ()
     position: float = 0.0
     located: bool = True
 

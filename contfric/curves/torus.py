@@ -157,9 +157,9 @@ def _joined(
     for end, position in zip(both, (0.0, float(arc[-1])), strict=True):
         if end.special is not None:
             kind = end.special.kind
-            place = _special(kind, end.special.orbit, position)
-            special.append(place)
-            ends.append(CurveEnd(end.reason, end.message, place))
+            location = _special(kind, end.special.orbit, position)
+            special.append(location)
+            ends.append(CurveEnd(end.reason, end.message, location))
         else:
             ends.append(end)
     special.sort(key=lambda s: s.position)

@@ -35,7 +35,7 @@ _SAME_START = 1e-4
 _NO_TIME = 1e-9
 #: Most changes of the signature along one side of a curve: a chain longer than this goes round.
 _MOST_CHANGES = 24
-#: A piece of a curve that is shorter than this is at one place: located events are good to 1e-9 or so.
+#: A piece of a curve that is shorter than this is at one location: located events are good to 1e-9 or so.
 _AT_ONE_LOCATION = 1e-6
 
 Progress = Callable[[str], None]
@@ -176,7 +176,7 @@ def trace_curve_side(
 ) -> CurveSide:
     """Follow a curve from a point along its tangent until it ends, through changes of its signature.
 
-    ``passed`` is what it was before, and the arclengths at which that ended: at one place each comes
+    ``passed`` is what it was before, and the arclengths at which that ended: at one location each comes
     once. ``keep`` is that of :func:`contfric.continuation.trace.trace_side`.
     """
     side = _trace_piece(problem, start, border, largest, max_points, progress, keep)
@@ -276,5 +276,5 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
 
 def _first(flags: NDArray[np.bool_]) -> int | None:
     """Return the first index that is true; None if none is."""
-    places = np.flatnonzero(flags)
-    return int(places[0]) if len(places) else None
+    locations = np.flatnonzero(flags)
+    return int(locations[0]) if len(locations) else None

@@ -40,7 +40,7 @@ class Crossing:
 
 
 @dataclass(frozen=True, eq=False)
-class Limits:
+class MarchLimits:
     """Where a march ends: bounds of the parameter, step and number of points."""
 
     low: float
@@ -61,7 +61,7 @@ class Run:
     end: BranchEnd = BranchEnd.POINTS
 
 
-def march(arc: Arc, start: CurvePoint, limits: Limits) -> Run:
+def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
     """Follow a curve from a point along its tangent; it ends after the first boundary of its region."""
     run, step = Run(arc, [start]), _FIRST
     closes = _Closing(start)
@@ -125,7 +125,7 @@ def _at_bound(arc: Arc, last: CurvePoint, following: CurvePoint, bound: float) -
     return arc.located(last, following, lambda at: arc.parameter(at.x) - bound) or last
 
 
-def _over(arc: Arc, place: CurvePoint, limits: Limits) -> float | None:
+def _over(arc: Arc, place: CurvePoint, limits: MarchLimits) -> float | None:
     """Return the bound of the parameter that a point lies beyond; None if it lies within."""
     value = arc.parameter(place.x)
     return limits.high if value > limits.high else limits.low if value < limits.low else None

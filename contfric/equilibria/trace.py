@@ -12,7 +12,7 @@ from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, EquilibriumKind, HopfPoint
 from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.hopf import centre_of
-from contfric.equilibria.march import Crossing, Limits, Run, march
+from contfric.equilibria.march import Crossing, MarchLimits, Run, march
 from contfric.equilibria.regions import check_no_excitation, scale_of
 from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, checked_range, real_number, shown, whole_number
@@ -95,7 +95,7 @@ def continue_equilibrium(
 
 def _limits(
     equilibrium: Equilibrium, parameter: str, bounds: tuple[float, float], step: float, points: int
-) -> Limits:
+) -> MarchLimits:
     low, high = checked_range(parameter, bounds)
     least, most, _, _ = equilibrium.model.limits(parameter, equilibrium.params)
     value = equilibrium.params[parameter]
@@ -103,7 +103,7 @@ def _limits(
         raise ParameterError(
             f"the equilibrium is at {parameter} = {value:g}, outside of the range ({low:g}, {high:g})"
         )
-    return Limits(
+    return MarchLimits(
         max(low, least),
         min(high, most),
         BranchEnd.LIMIT if least > low else BranchEnd.RANGE,
@@ -120,7 +120,7 @@ class _Leg:
         self.run, self.events = run, events
 
 
-def _followed(arc: Arc, start: CurvePoint, limits: Limits) -> list[_Leg]:
+def _followed(arc: Arc, start: CurvePoint, limits: MarchLimits) -> list[_Leg]:
     """Follow a curve from region to region."""
     legs: list[_Leg] = []
     left = limits.max_points
@@ -153,7 +153,7 @@ def _followed(arc: Arc, start: CurvePoint, limits: Limits) -> list[_Leg]:
     return legs
 
 
-def _is_at_limit(arc: Arc, place: CurvePoint, limits: Limits) -> bool:
+def _is_at_limit(arc: Arc, place: CurvePoint, limits: MarchLimits) -> bool:
     """Tell whether an event is at a limit of the model, where formulas may degenerate."""
     value, near = arc.parameter(place.x), _AT_LIMIT * (limits.high - limits.low)
     below = limits.low_end is BranchEnd.LIMIT and value - limits.low < near

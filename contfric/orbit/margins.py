@@ -21,7 +21,7 @@ class Margin(str, Enum):
 
 
 @dataclass(frozen=True)
-class Test:
+class EventFunction:
     """What one margin of a system means: its kind, segment and surface."""
 
     __test__ = False  # not a test case of pytest
@@ -50,24 +50,26 @@ def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tupl
 
 def double_zeros(
     model: Model, itinerary: Itinerary, half: bool, holds: tuple[Hold, ...]
-) -> list[tuple[Test, int]]:
+) -> list[tuple[EventFunction, int]]:
     """Margins with a double zero where a segment that must last has no length, each with that segment.
 
     The load at the end of a hold after a touch of its limit, the load at the stop before that touch, and the
     acceleration with which a hold is left into a slide up to the touch of the next one.
     """
-    pairs: list[tuple[Test, int]] = []
+    pairs: list[tuple[EventFunction, int]] = []
     left = {(hold.segment + 1) % len(itinerary) for hold in holds}
     for hold in holds:
         before = (hold.segment - 1) % len(itinerary)
         if hold.after_rest:
             surface = itinerary[before][1]
-            pairs.append((Test(Margin.JOINT, hold.segment, surface), hold.segment))
+            pairs.append((EventFunction(Margin.JOINT, hold.segment, surface), hold.segment))
             if before == 0 and half and model.symmetry is not None:  # its stop is a mirror image
                 back = {image: name for name, image in model.symmetry.surfaces.items()}
                 surface = back[surface]
-            pairs.append((Test(Margin.JOINT, (before - 1) % len(itinerary), surface), before))
+            pairs.append(
+                (EventFunction(Margin.JOINT, (before - 1) % len(itinerary), surface), before)
+            )
         elif hold.pin is None and before in left:
             stopped = next(h for h in holds if (h.segment + 1) % len(itinerary) == before)
-            pairs.append((Test(Margin.EXIT, stopped.segment, stopped.leaves), before))
+            pairs.append((EventFunction(Margin.EXIT, stopped.segment, stopped.leaves), before))
     return pairs

@@ -64,13 +64,13 @@ class ExtremeWorkspace(NamedTuple):
     ----------
     equations : for the segments of the whole orbit
     cycle : joints of the whole orbit
-    place : where the extremum is reached, shape (4,)
+    location : where the extremum is reached, shape (4,)
     start : gradient by the joint where that segment starts, shape (m,)
     """
 
     equations: EquationWorkspace
     cycle: FloatArray
-    place: FloatArray
+    location: FloatArray
     start: FloatArray
 
 
@@ -131,38 +131,38 @@ def stationary_in(functions, extreme, i, p, own, stationary):  # type: ignore[no
 
 
 @helper
-def better(value, best, place, segment, kind, time):  # type: ignore[no-untyped-def]
+def better(value, best, location, segment, kind, time):  # type: ignore[no-untyped-def]
     """Return the larger of two values, and keep the place of the first if it is larger."""
     if not value > best:
-        place[NEXT] = max(place[NEXT], value)
+        location[NEXT] = max(location[NEXT], value)
         return best
-    place[NEXT] = best
-    place[SEGMENT], place[KIND], place[TIME] = segment, kind, time
+    location[NEXT] = best
+    location[SEGMENT], location[KIND], location[TIME] = segment, kind, time
     return value
 
 
 @helper
-def find_place(functions, layout, extreme, z, p, own, stationary):  # type: ignore[no-untyped-def]
+def find_location(functions, layout, extreme, z, p, own, stationary):  # type: ignore[no-untyped-def]
     """Find where the extremum is reached; False if a search fails."""
-    cycle, place, whole, equations = own.cycle, own.place, extreme.whole, own.equations
+    cycle, location, whole, equations = own.cycle, own.location, extreme.whole, own.equations
     c, sign, n = extreme.observable, extreme.sign, z.shape[1] - 1
     none, empty, best = equations.none, equations.empty, -np.inf
-    place[NEXT] = best
+    location[NEXT] = best
     fill_cycle(functions, layout, extreme, z, p, own)
     for i in range(cycle.shape[0]):
         value = sign * seen(functions, c, cycle[i, 0], cycle[i, 1:], p, none, empty)
-        best = better(value, best, place, i, JOINT, 0.0)
+        best = better(value, best, location, i, JOINT, 0.0)
         if whole.resets[i] >= 0:
             apply_reset(functions, whole, i, cycle[i], p, none, equations)
             behind = equations.behind[n, :n]
             value = sign * seen(functions, c, cycle[i, 0], behind, p, none, empty)
-            best = better(value, best, place, i, BEHIND, 0.0)
+            best = better(value, best, location, i, BEHIND, 0.0)
         found = stationary_in(functions, extreme, i, p, own, stationary) if extreme.inside else 0
         if found < 0:
             return False
         for k in range(found):
             value = sign * stationary.values[k]
-            best = better(value, best, place, i, INSIDE, stationary.times[k])
+            best = better(value, best, location, i, INSIDE, stationary.times[k])
     return math.isfinite(best)
 
 
@@ -180,12 +180,12 @@ def add_chained(start, by_parameters, grad, jac, at, n):  # type: ignore[no-unty
 
 
 @helper
-def gradient_at_place(functions, extreme, p, which, equations, stationary, own, by_parameters):  # type: ignore[no-untyped-def]
-    """Return the value at the place, with its gradient by the joint of its segment and by the parameters."""
-    place, whole, grad, start = own.place, extreme.whole, equations.grad, own.start
+def gradient_at_location(functions, extreme, p, which, equations, stationary, own, by_parameters):  # type: ignore[no-untyped-def]
+    """Return the value at the location, with its gradient by the joint of its segment and the parameters."""
+    location, whole, grad, start = own.location, extreme.whole, equations.grad, own.start
     i, kind, c, n = (
-        int(place[SEGMENT]),
-        int(place[KIND]),
+        int(location[SEGMENT]),
+        int(location[KIND]),
         extreme.observable,
         own.start.shape[0] - 1,
     )
@@ -206,8 +206,8 @@ def gradient_at_place(functions, extreme, p, which, equations, stationary, own, 
         return value
     found, nearest = stationary_in(functions, extreme, i, p, own, stationary), -1
     for k in range(found):
-        gap = abs(stationary.times[k] - place[TIME])
-        if nearest < 0 or gap < abs(stationary.times[nearest] - place[TIME]):
+        gap = abs(stationary.times[k] - location[TIME])
+        if nearest < 0 or gap < abs(stationary.times[nearest] - location[TIME]):
             nearest = k
     if nearest < 0:
         return np.nan
@@ -222,15 +222,15 @@ def gradient_at_place(functions, extreme, p, which, equations, stationary, own, 
 def extreme_row(  # type: ignore[no-untyped-def]
     functions, layout, extreme, z, p, which, equations, stationary, own, on_joints, on_parameters
 ):
-    """Return Q at the place that was found, and write Q' by joints and parameters."""
+    """Return Q at the location that was found, and write Q' by joints and parameters."""
     count, m = z.shape
     on_joints[:, :] = 0.0
     on_parameters[:] = 0.0
     fill_cycle(functions, layout, extreme, z, p, own)
-    value = gradient_at_place(
+    value = gradient_at_location(
         functions, extreme, p, which, equations, stationary, own, on_parameters
     )
-    i, start = int(own.place[SEGMENT]), own.start
+    i, start = int(own.location[SEGMENT]), own.start
     base = i % count
     on_joints[base, 0] = start[0]
     for k in range(1, m):
@@ -256,7 +256,7 @@ def measure_extreme(functions, layout, extreme, z, p, on_joints, on_parameters):
     which, stationary = np.arange(p.shape[0]), stationary_workspace()
     equations = equation_workspace(count, m, p.shape[0])
     own = extreme_workspace(extreme.whole.modes.shape[0], m, min(count, 0))
-    if not find_place(functions, layout, extreme, z, p, own, stationary):
+    if not find_location(functions, layout, extreme, z, p, own, stationary):
         return np.nan
     value = extreme_row(
         functions,
@@ -271,7 +271,7 @@ def measure_extreme(functions, layout, extreme, z, p, on_joints, on_parameters):
         on_joints,
         on_parameters,
     )
-    tied = own.place[NEXT] >= extreme.sign * value - EQUAL * (1.0 + abs(value))
+    tied = own.location[NEXT] >= extreme.sign * value - EQUAL * (1.0 + abs(value))
     return np.nan if tied else value
 
 

@@ -33,7 +33,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.begins import beginnings, entry_rows, joints_before
 from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
-from contfric.orbit.margins import Margin, Test, double_zeros, lasting_segments
+from contfric.orbit.margins import EventFunction, Margin, double_zeros, lasting_segments
 from contfric.orbit.structure import (
     ending_sides,
     exit_domains,
@@ -46,12 +46,12 @@ from contfric.remember.stored import made_of
 from contfric.signature.holds import is_hold
 
 __all__ = [
+    "EventFunction",
     "IntArray",
     "Itinerary",
     "Layout",
     "Margin",
     "System",
-    "Test",
     "build_system",
     "exit_domains",
     "inside_sign",
@@ -131,7 +131,7 @@ class System:
     periods: int
     half: bool
     layout: Layout
-    tests: tuple[Test, ...]
+    tests: tuple[EventFunction, ...]
     domains: tuple[str, ...] = ()
     holds: tuple[Hold, ...] = ()
 
@@ -297,7 +297,7 @@ def _margins(
     full: bool,
     holds: tuple[Hold, ...],
     entries: list[tuple[int, ...]],
-) -> tuple[IntArray, IntArray, tuple[Test, ...]]:
+) -> tuple[IntArray, IntArray, tuple[EventFunction, ...]]:
     names = [s.name for s in model.surfaces]
     interior: list[tuple[int, ...]] = []
     joint: list[tuple[int, ...]] = []
@@ -321,15 +321,18 @@ def _margins(
                 continue
             joint.append((i, model.surface_index[surface], sign, 0))
     tests = (
-        *(Test(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
+        *(EventFunction(Margin.INTERIOR, i, names[k]) for i, k, _ in interior),
         *(
-            Test(Margin.EXIT, i, _exit_surface(i, exit_, holds))
+            EventFunction(Margin.EXIT, i, _exit_surface(i, exit_, holds))
             for i, (_, exit_) in enumerate(itinerary)
         ),
-        *(Test(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
-        *(Test(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
-        *(Test(Margin.LASTING, i, surface) for i, surface in lasting_segments(itinerary, holds)),
-        *(Test(Margin.HELD, h.segment, h.leaves) for h in holds),
+        *(EventFunction(Margin.JOINT, i, names[k]) for i, k, *_ in joint),
+        *(EventFunction(Margin.ENTRY, i, names[k]) for i, k, *_ in entries),
+        *(
+            EventFunction(Margin.LASTING, i, surface)
+            for i, surface in lasting_segments(itinerary, holds)
+        ),
+        *(EventFunction(Margin.HELD, h.segment, h.leaves) for h in holds),
     )
     return _rows(interior), _rows([*joint, *entries], 4), tests
 

@@ -91,7 +91,7 @@ OTHER_MARKER = Marker("*", face="white", size=7.0)
 
 
 @dataclass(frozen=True)
-class Row:
+class DiagramRow:
     """One quantity of a diagram: the name on the axis, in which %s is the displacement as mathematics."""
 
     label: str
@@ -108,7 +108,7 @@ class Row:
 
 #: The rows that need the joints of orbits only; any other quantity is measured when it is asked for.
 ROWS = {
-    name: Row(NAMED[name].label, NAMED[name].even)
+    name: DiagramRow(NAMED[name].label, NAMED[name].even)
     for name in ("x_max", "x_min", "stops", "psi", "period")
 }
 
@@ -117,17 +117,17 @@ ROWS = {
 _TIMES, _STATES = frozenset({"period"}), frozenset({"x_max", "x_min", "stops"})
 
 
-def _in_units(row: Row, name: str, model: Model | None) -> Row:
+def _in_units(row: DiagramRow, name: str, model: Model | None) -> DiagramRow:
     """Return a row whose label says in what unit of the model it is."""
     units = dict(model.units) if model is not None else {}
     if model is not None and name in _STATES:
         unit = units.get(model.states[0], 1.0)
     else:
         unit = units.get("t", 1.0) if name in _TIMES else 1.0
-    return row if unit == 1.0 else Row(f"{row.label} / {unit:g}", row.even)
+    return row if unit == 1.0 else DiagramRow(f"{row.label} / {unit:g}", row.even)
 
 
-def row_of(asked: QuantityLike, model: Model | None) -> Row:
+def row_of(asked: QuantityLike, model: Model | None) -> DiagramRow:
     """Return a row: any quantity of the model; without a model, one of :data:`ROWS`.
 
     Raises
@@ -143,7 +143,7 @@ def row_of(asked: QuantityLike, model: Model | None) -> Row:
         raise ParameterError(f"no row '{asked}' in a diagram{did_you_mean(asked, names)}")
     found = quantity_of(asked, model)
     label = found.name if found.named is None else found.named.label
-    return Row(label, found.even)
+    return DiagramRow(label, found.even)
 
 
 def lighter(colour: str, share: float = 0.45) -> str:

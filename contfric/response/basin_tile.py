@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.chaos.rows import Limits, follow, new_stop, starting, until_interrupted
+from contfric.chaos.rows import FollowingLimits, follow, new_stop, starting, until_interrupted
 from contfric.chaos.status import Motion
 from contfric.chaos.work import Task
 from contfric.models.definition import FloatArray, Model
@@ -98,7 +98,7 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
     open_ = np.flatnonzero(free & ~np.isin(ends, list(known)))
     if len(open_) and (stop is None or stop[0] == 0):
         vectors = np.tile(task.vector, (len(open_), 1))
-        limits = Limits(_TRANSIENT, max(1, task.periods), _TOLERANCE)
+        limits = FollowingLimits(_TRANSIENT, max(1, task.periods), _TOLERANCE)
         cells = follow(task.model, vectors, task.states[open_], task.time, limits, stop)
         motions[open_] = cells.motions
     return BasinRows(labels.astype(np.int32), motions)

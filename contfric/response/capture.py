@@ -13,7 +13,7 @@ from numba import types
 
 from contfric.chaos.cells import StartingType
 from contfric.chaos.starting import start_mode
-from contfric.chaos.tangent import ARRIVED, new_walk, state_workspace, to_joint
+from contfric.chaos.tangent import ARRIVED, new_transit, state_workspace, to_joint
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.sides import surfaces_after
@@ -73,33 +73,33 @@ def capture(  # type: ignore[no-untyped-def]
         ``NO_START`` or ``NOT_YET``; periods followed; shape (k,)
     """
     n, surfaces = states.shape[1], tables.observables.shape[0]
-    walk, workspace = new_walk(n), state_workspace(n)
+    transit, workspace = new_transit(n), state_workspace(n)
     period = functions.period(p, workspace.none, workspace.empty)
     timeless = period <= 0.0
     if timeless:
         period = 1.0
-    walk.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
+    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
     phase = time if timeless else time - math.floor(time / period) * period
     for cell in range(states.shape[0]):
         if stop[0] != 0:
             break
         for j in range(n):
-            walk.y[j] = states[cell, j]
-        walk.at_once[0] = walk.at_once[2] = 0
+            transit.y[j] = states[cell, j]
+        transit.at_once[0] = transit.at_once[2] = 0
         labels[cell], ends[cell], cycle, t = -1, NOT_YET, 0, phase
-        mode, on = start_mode(functions, tables, starting, time, walk.y, p, workspace)
+        mode, on = start_mode(functions, tables, starting, time, transit.y, p, workspace)
         if mode < 0:
             ends[cell] = NO_START
         while mode >= 0 and cycle < periods and stop[0] == 0:
             outcome, surface, following, _, turns, t = to_joint(
-                functions, tables, mode, on, t, p, period, walk, workspace
+                functions, tables, mode, on, t, p, period, transit, workspace
             )
             if outcome != ARRIVED:
                 ends[cell] = outcome
                 break
             on = surfaces_after(tables, mode, surface)
             mode, cycle = following, cycle + turns
-            label = caught(targets, mode * surfaces + surface, t, walk.y, period, timeless)
+            label = caught(targets, mode * surfaces + surface, t, transit.y, period, timeless)
             if label >= 0:
                 labels[cell] = label
                 break

@@ -296,11 +296,11 @@ def test_a_task_carries_a_model_that_is_not_known_by_name() -> None:
 
 
 def _tile(model: cf.Model) -> Tile:
-    from contfric.chaos.rows import Limits
+    from contfric.chaos.rows import FollowingLimits
 
     vector = model.vector({"S0": 0.4})
     values = (np.array([0.35, 0.5]), np.array([0.05, 0.3]))
-    return Tile(model, Limits(20, 50, 0.01), vector, (0, 1), values, 1, None, 0.0)
+    return Tile(model, FollowingLimits(20, 50, 0.01), vector, (0, 1), values, 1, None, 0.0)
 
 
 def test_memory_is_that_of_the_results() -> None:

@@ -16,7 +16,7 @@ import contfric as cf
 from contfric.atlas.matching import identity, stops_distance
 from contfric.censuses.census import _Census
 from contfric.censuses.conditions import Arcs, Fate, least_periods
-from contfric.censuses.grid import Limits
+from contfric.censuses.grid import CensusLimits
 from contfric.censuses.itineraries import canonical_pair, closed_itineraries, letters_of, stops_of
 from contfric.censuses.sections import sections_of
 from contfric.orbit.orbit import Orbit, Status
@@ -174,7 +174,7 @@ def test_without_the_symmetry_mirror_images_are_found_by_themselves(seed: int) -
 def test_what_is_pruned_has_no_orbit(seed: int) -> None:
     """A search that asks for every walk finds none of those that the conditions rule out."""
     model = cf.load_model("coulomb")
-    limits = Limits(PERIODS, STOPS)
+    limits = CensusLimits(PERIODS, STOPS)
     state = _Census(model, model.vector(scene(seed)), limits, 0, 10**6, 3, None)
     state.prepare()
     ruled_out = {walk for walk, fate in state.fates.items() if fate is not None}

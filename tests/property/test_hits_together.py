@@ -8,7 +8,7 @@ import pytest
 from mpmath import mp
 
 import contfric as cf
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 from contfric.compiling.lanes import LANES, read, write
 from contfric.flow.sines import sine_cosine
 from contfric.flow.together import together
@@ -101,7 +101,7 @@ def test_hits_are_those_of_each_motion_by_itself(seed: int) -> None:
 
 def test_a_cell_comes_to_the_same_bits_whatever_is_beside_it() -> None:
     model, draw = load_model("coulomb"), np.random.default_rng(3)
-    count, limits = 70, Limits(periods=60, transient=20, tolerance=0.0, confirm=0)
+    count, limits = 70, FollowingLimits(periods=60, transient=20, tolerance=0.0, confirm=0)
     vectors = np.array(
         [
             model.vector({"Omega": w, "S": s, "S0": 0.4})

@@ -12,7 +12,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.conditions import possible, relation_of
 from contfric.continuation.events import Kind
 from contfric.continuation.incident import incident_forms, vanishing
-from contfric.continuation.places import normal_place
+from contfric.continuation.locations import normal_place
 from contfric.orbit.margins import Margin
 
 #: In diagrams near this one, in zeta, a hold can just not be left inside any more.

@@ -7,7 +7,7 @@ import pytest
 
 import contfric as cf
 from contfric import Motion
-from contfric.chaos.rows import Limits, follow
+from contfric.chaos.rows import FollowingLimits, follow
 
 SEEDS = range(60)
 
@@ -87,10 +87,10 @@ def test_errors_are_what_they_say() -> None:
     vectors[:, 1] = rng.uniform(0.02, 0.4, count) * vectors[:, 2]
     states = np.zeros((count, 2))
     states[:, 0] = 1.0 + 0.9 * vectors[:, 2]
-    short = follow(model, vectors, states, 0.0, Limits(100, 600, 0.0))
+    short = follow(model, vectors, states, 0.0, FollowingLimits(100, 600, 0.0))
     chaotic = np.flatnonzero(short.motions == Motion.CHAOTIC.code)[:60]
     assert len(chaotic) == 60
-    long = follow(model, vectors[chaotic], states[chaotic], 0.0, Limits(100, 15_000, 0.0))
+    long = follow(model, vectors[chaotic], states[chaotic], 0.0, FollowingLimits(100, 15_000, 0.0))
     still = long.motions == Motion.CHAOTIC.code
     difference = short.exponents[chaotic, 0] - long.exponents[:, 0]
     scaled = difference / np.hypot(short.errors[chaotic, 0], long.errors[:, 0])

@@ -18,7 +18,7 @@ import contfric as cf
 from contfric.continuation.accuracy import off_circle
 from contfric.continuation.vertices import symmetric_part
 from contfric.orbit.solve import refine
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.holds import TOUCH
 
 Scene = tuple[dict[str, float], str, tuple[float, float]]
@@ -202,7 +202,8 @@ def test_a_slide_between_two_holds_must_last() -> None:
             for i, (_, exit_) in enumerate(itinerary):
                 if exit_ == TOUCH and itinerary[i - 2][1].startswith("hold@"):
                     assert (
-                        Test(Margin.LASTING, (i - 1) % len(itinerary), "v") in branch.system.tests
+                        EventFunction(Margin.LASTING, (i - 1) % len(itinerary), "v")
+                        in branch.system.tests
                     )
                     seen += 1
     assert seen > 4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.several_places import Opening, opening_together
+from contfric.atlas.several_locations import Opening, opening_together
 from contfric.continuation.candidates import sequences_of
 from contfric.continuation.events import TERMINAL
 from contfric.continuation.incident import Incident, incident_forms

@@ -1,22 +1,22 @@
-"""The places of an orbit at which a sliding event happens."""
+"""The locations of an orbit at which a sliding event happens."""
 
 from __future__ import annotations
 
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.kinds import hold_of_test
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Margin, Test
+from contfric.orbit.system import EventFunction, Margin
 
 
-def places_of(bifurcation: Bifurcation) -> list[Test]:
+def locations_of(bifurcation: Bifurcation) -> list[EventFunction]:
     """Return the places of the whole orbit at which a sliding event happens."""
     orbit = bifurcation.orbit
-    places = [normal_place(test, orbit) for test in bifurcation.tests]
-    places = list(dict.fromkeys(places))
+    locations = [normal_location(test, orbit) for test in bifurcation.tests]
+    locations = list(dict.fromkeys(locations))
     if orbit.system.half and orbit.model.symmetry is not None:
         n, image = len(orbit.system.itinerary), orbit.model.symmetry.surfaces
-        places += [Test(t.margin, t.segment + n, image[t.surface]) for t in places]
-    return places
+        locations += [EventFunction(t.margin, t.segment + n, image[t.surface]) for t in locations]
+    return locations
 
 
 #: The rate with which an exit is met that is tangential: an orbit misses the tangency by half of the square
@@ -24,17 +24,17 @@ def places_of(bifurcation: Bifurcation) -> list[Test]:
 TANGENTIAL = 1e-6
 
 
-def normal_place(test: Test, orbit: Orbit) -> Test:
+def normal_location(test: EventFunction, orbit: Orbit) -> EventFunction:
     """Return a test of what belongs to a hold as one of the hold itself, and one of an exit as of the exit.
 
     Where a segment meets its exit without rate, a touch of that surface inside of it is the exit itself.
     """
     hold = hold_of_test(test, orbit)
     if hold is None and test.margin is Margin.INTERIOR:
-        end = Test(Margin.EXIT, test.segment, test.surface)
+        end = EventFunction(Margin.EXIT, test.segment, test.surface)
         if orbit.itinerary[test.segment][1] == test.surface and end in orbit.system.tests:
             at_exit = abs(orbit.margins[orbit.system.tests.index(end)]) < TANGENTIAL
             return end if at_exit else test
     if hold is None or hold.segment == test.segment:
         return test
-    return Test(Margin.EXIT, hold.segment, hold.leaves)
+    return EventFunction(Margin.EXIT, hold.segment, hold.leaves)

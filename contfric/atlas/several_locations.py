@@ -1,16 +1,17 @@
-"""How an orbit leaves an event at which several places of it are singular at once: by leading orders.
+"""How an orbit leaves an event at which several locations of it are singular at once: by leading orders.
 
 Where a slide of no length comes in, its ends may move together, and no equation changes to first order. Such
 a freedom v is a null vector of the Jacobian F_z of all equations. What it does is of order p, two at a touch
-of rest and three where the acceleration falls through zero. With freedoms at k places, and the distance
+of rest and three where the acceleration falls through zero. With freedoms at k locations, and the distance
 lambda in the parameter, the left null vectors L of F_z leave
 
     L F_lambda lambda + sum_j L d_j eps_j^p_j = 0,
 
-k equations for the k numbers ``eps_j^p_j``. Their roots are how far each place opens: by the root of lambda
-where the order is two, by the third root where it is three. So where orders differ the proportion depends on
-the distance. One place alone may open as it likes: its direction is v. A start that opens several of them in
-another proportion is no guess for Newton's method, whose matrix is nearly singular in all of them.
+k equations for the k numbers ``eps_j^p_j``. Their roots are how far each location opens: by the root of
+lambda where the order is two, by the third root where it is three. So where orders differ the proportion
+depends on the distance. One location alone may open as it likes: its direction is v. A start that opens
+several of them in another proportion is no guess for Newton's method, whose matrix is nearly singular in all
+of them.
 """
 
 from __future__ import annotations
@@ -30,21 +31,21 @@ from contfric.orbit.slides import SHORT, time_unit
 _NULL = 1e-7
 #: Components of a freedom below this share of the largest are rounding of a singular direction: its root.
 _OWN = 1e-3
-#: Length of the finite step along a freedom: places of an arriving orbit may be open by 1e-4 (the third root
-#: of rounding times its condition), and the next order is this much smaller.
+#: Length of the finite step along a freedom: locations of an arriving orbit may be open by 1e-4 (the third
+#: root of rounding times its condition), and the next order is this much smaller.
 _STEP = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """How the joints of an orbit move away from an event at which several places of it open at once.
+    """How the joints of an orbit move away from an event at which several locations of it open at once.
 
     Attributes
     ----------
     freedoms : ndarray, shape (k, N, m)
-        Of the places, each with the largest component 1.
+        Of the locations, each with the largest component 1.
     sizes : ndarray, shape (k,)
-        How far each place opens at a unit of the parameter.
+        How far each location opens at a unit of the parameter.
     orders : ndarray, shape (k,)
         The power of each freedom that the parameter is.
     """
@@ -54,7 +55,7 @@ class Opening:
     orders: FloatArray
 
     def at(self, distance: float) -> FloatArray:
-        """Return how the joints move where the place that opens farthest does so by a distance."""
+        """Return how the joints move where the location that opens farthest does so by a distance."""
         opens = self.sizes != 0.0
         shift = np.min((distance / np.abs(self.sizes[opens])) ** self.orders[opens])
         moved: FloatArray = np.tensordot(
@@ -64,9 +65,9 @@ class Opening:
 
 
 def opening_together(orbit: Orbit, active: int) -> Iterator[Opening]:
-    """Yield how the joints of an orbit at an event move where several places of it open at once.
+    """Yield how the joints of an orbit at an event move where several locations of it open at once.
 
-    For either side of the event; nothing where fewer than two places are singular, or where their freedoms
+    For either side of the event; nothing where fewer than two locations are singular, or where their freedoms
     cannot be told apart.
     """
     start, jacobian, column = equations_at(orbit.system, orbit.joints, orbit.vector, (active,))
@@ -74,7 +75,7 @@ def opening_together(orbit: Orbit, active: int) -> Iterator[Opening]:
     rank = int(np.sum(size > _NULL * size[0]))
     if len(size) - rank < 2:
         return
-    freedoms = _of_places(right[rank:].reshape(-1, *orbit.joints.shape))
+    freedoms = _of_locations(right[rank:].reshape(-1, *orbit.joints.shape))
     if freedoms is None:
         return
     left = left[:, rank:].T
@@ -89,10 +90,10 @@ def opening_together(orbit: Orbit, active: int) -> Iterator[Opening]:
             yield Opening(freedoms, sizes, orders)
 
 
-def _of_places(null: FloatArray) -> FloatArray | None:
-    """Return null vectors each of which moves the joints of one place only, shape (k, N, m); None if mixed.
+def _of_locations(null: FloatArray) -> FloatArray | None:
+    """Return null vectors that move the joints of one location each, shape (k, N, m); None if mixed.
 
-    The projector on all of them falls into blocks, one a place.
+    The projector on all of them falls into blocks, one a location.
     """
     k, count, m = null.shape
     flat = null.reshape(k, -1)
@@ -152,7 +153,7 @@ def _effects(
 def _sizes(
     orbit: Orbit, freedoms: FloatArray, orders: FloatArray, powers: FloatArray
 ) -> FloatArray | None:
-    """Return how far each place opens at a unit of the parameter; None where a square would be negative.
+    """Return how far each location opens at a unit of the parameter; None where a square would be negative.
 
     A square has two roots: that which a solution has (:func:`_longer`).
     """
