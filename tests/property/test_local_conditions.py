@@ -12,7 +12,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.conditions import possible, relation_of
 from contfric.continuation.events import Kind
 from contfric.continuation.incident import incident_forms, vanishing
-from contfric.continuation.locations import normal_place
+from contfric.continuation.locations import normal_location
 from contfric.orbit.margins import Margin
 
 #: In diagrams near this one, in zeta, a hold can just not be left inside any more.
@@ -81,6 +81,6 @@ def test_exit_that_is_tangential_to_rounding() -> None:
             if not 1e-9 < abs(rate) < 1e-6:
                 continue
             places = [place for place, _ in vanishing(moved, 1e-9)]
-            assert normal_place(test, moved) in places
+            assert normal_location(test, moved) in places
             asked += 1
     assert asked
