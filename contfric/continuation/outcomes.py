@@ -4,7 +4,7 @@ The solution at the event is known, so the local structure of each outcome can b
 (``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
 
 =====================================  ========================================================
-event, at the location                    outcome
+event, at the location                 outcome
 =====================================  ========================================================
 CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
 SS, followed by a reversal             insert a hold of length zero, pinned to F
@@ -364,9 +364,7 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
             f"the impact after segment {i + 1} changes the mode: it cannot be left out"
         )
     reason = f"no impact on {location.surface} after segment {i + 1}"
-    if (
-        itinerary[behind] in orbit.model.sections
-    ):  # its mode says from which side the section is crossed
+    if itinerary[behind] in orbit.model.sections:  # its mode says from which side it is crossed
         edit = Edit(frozenset({i, behind}), {}, {i: (itinerary[behind],)})
         return Outcome(edit, {(i, 0): orbit.cycle[i]}, reason)
     return Outcome(Edit(frozenset({behind}), {i: itinerary[behind][1]}), {}, reason)
@@ -397,6 +395,5 @@ def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
             rest = model.domain_by_name[target].mode
             if through == surface and model.lies_on(rest, surface):
                 return rest
-    raise NoJump(
-        f"mode '{orbit.itinerary[i][0]}' of model '{model.name}' never comes to rest on {surface}"
-    )
+    mode = orbit.itinerary[i][0]
+    raise NoJump(f"mode '{mode}' of model '{model.name}' never comes to rest on {surface}")

@@ -36,12 +36,14 @@ def is_pressed(functions, tables, mode, surface, following, t, before, y, p, uni
 
 @helper
 def is_crossed(functions, tables, mode, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether motion that has met a surface goes through it, and does not only touch it.
+    """Tell whether motion goes through a surface that no mode is behind, and does not only touch it.
 
-    Over the shortest flight the rate of a crossing hardly changes. A touch is found to the root of rounding:
-    its rate is a tenth of that flight's change at most.
+    Where some mode is, for other sides of other surfaces, these may be rounding: motion goes on. Over the
+    shortest flight the rate of a crossing hardly changes. A touch is found to the root of rounding: its rate
+    is a tenth of that flight's change at most.
     """
-    if tables.flights[mode] >= 0:
+    rules = mode * tables.observables.shape[0] + surface
+    if tables.flights[mode] >= 0 or tables.first[rules + 1] > tables.first[rules]:
         return False
     c, none, empty = tables.observables[surface], workspace.none, workspace.empty
     here, h = functions.rate(mode, c, t, y, p, none, empty), NO_FLIGHT * unit
