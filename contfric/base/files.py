@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from contfric.errors import ResultFileError
+from contfric.errors import ResultFileError, path_of
 
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _CLOSED = (errno.EROFS, errno.EACCES, errno.EPERM)
@@ -63,6 +63,22 @@ def _flush(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def made_folder(what: str, folder: str | Path) -> Path:
+    """Return a folder, which is made where it does not exist.
+
+    Raises
+    ------
+    ResultFileError
+        If it is no path, or cannot be made. ``what`` says what it is for.
+    """
+    path = path_of(what, folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultFileError(unwritable(path, error)) from error
+    return path
 
 
 def unwritable(path: Path, error: OSError) -> str:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from contfric.base.files import replacing, unwritable
-from contfric.errors import ResultFileError, path_of
+from contfric.base.files import made_folder, replacing
+from contfric.errors import ResultFileError
 from contfric.models.definition import Model
 
 _RECORD = "map.json"
@@ -62,11 +62,7 @@ def open_tiles(folder: str | Path, record: dict[str, Any]) -> TileFolder:
     ResultFileError
         If it is no path, holds those of another map, or cannot be written.
     """
-    path = path_of("the folder of finished tiles", folder)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ResultFileError(unwritable(path, error)) from error
+    path = made_folder("the folder of finished tiles", folder)
     file = path / _RECORD
     if file.is_file():
         _check_same(file, record)

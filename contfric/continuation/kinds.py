@@ -134,7 +134,7 @@ def _leaves(system: System, test: EventFunction, orbit: Orbit) -> bool:
     return bends_outward(orbit, resting.mode, test.surface, sign, end)
 
 
-def stands_still(orbit: Orbit, test: EventFunction) -> bool:
+def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
     """Tell whether the load stands still at a stop and moves before or after: it is extreme there.
 
     Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.

@@ -6,7 +6,7 @@ import numpy as np
 
 from contfric.continuation.accuracy import Estimate
 from contfric.continuation.events import Bifurcation, Kind
-from contfric.continuation.kinds import stands_still
+from contfric.continuation.kinds import load_stands_still
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.split_touch import splits
 from contfric.orbit.orbit import Orbit
@@ -55,7 +55,7 @@ def _stability(
 
 def _is_rough(kind: Kind, here: Orbit, tests: tuple[EventFunction, ...]) -> bool:
     """Tell whether an event is located to the root of rounding only: where the load stands still."""
-    return kind in (Kind.CS, Kind.SS) and any(stands_still(here, test) for test in tests)
+    return kind in (Kind.CS, Kind.SS) and any(load_stands_still(here, test) for test in tests)
 
 
 def _stable(point: Point, here: Orbit, settings: Settings) -> bool | None:

@@ -28,7 +28,7 @@ _TOUCHES = 1e-4
 def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     """Tell whether segment ``i`` is a slide between two stops without acceleration at either of them.
 
-    Accelerations below ``least`` are none.
+    Accelerations below ``least`` count as zero.
     """
     mode, exit_ = orbit.itinerary[i]
     if not orbit.model.filippov or is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:

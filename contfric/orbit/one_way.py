@@ -1,4 +1,4 @@
-"""Words in which something only ever grows, such as the offset of a slider that slips to one side only.
+"""Itineraries in which something only ever grows, such as the offset of a slider that slips to one side only.
 
 A linear function ``w . y`` whose rate is, along some modes, a positive multiple of the height of a surface on
 whose one side all of these lie, and zero along all others, grows whenever a motion is in one of them. It is

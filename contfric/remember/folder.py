@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from contfric.base.files import unwritable
-from contfric.errors import ResultFileError, path_of
+from contfric.base.files import made_folder
+from contfric.errors import ResultFileError
 from contfric.remember.journal import Journal, belongs, keeping, program
 
 #: The journal in it.
@@ -28,11 +28,7 @@ def kept_in(folder: str | Path | None) -> Iterator[None]:
     if folder is None:
         yield
         return
-    path = path_of("the folder of finished parts", folder)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ResultFileError(unwritable(path, error)) from error
+    path = made_folder("the folder of finished parts", folder)
     file = path / _NAME
     if file.exists() and not belongs(file, program()):
         raise ResultFileError(

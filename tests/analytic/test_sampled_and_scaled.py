@@ -12,16 +12,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from typed import typed
 
 import contfric as cf
-
-
-def typed(folder: Path, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
-
 
 THERMOSTAT = """
 name: sampled

@@ -13,6 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -30,13 +31,6 @@ modes:
   empty: {in: {pulse: +, diode: 0}, field: {i: 0, u: -u/(R*C)}}
 spread: {i: 3, u: 8}
 """
-
-
-def typed(folder, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
 
 
 def affine(matrix, constant, time: float):

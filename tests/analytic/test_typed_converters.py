@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -57,13 +58,6 @@ modes:
   off: {in: {pulse: +, diode: +}, field: {i: (E - u)/L, u: (i - u/R)/C}}
   empty: {in: {pulse: +, diode: 0}, field: {i: 0, u: -u/(R*C)}}
 """
-
-
-def typed(folder, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
 
 
 def advanced(matrix, constant, state, time: float):

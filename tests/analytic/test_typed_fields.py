@@ -7,16 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
-
-
-def typed(folder, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
-
 
 #: McKean's piecewise linear FitzHugh-Nagumo equations.
 MCKEAN = """

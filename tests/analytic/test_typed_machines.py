@@ -9,16 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import fsolve
+from typed import typed
 
 import contfric as cf
-
-
-def typed(folder, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
-
 
 #: The simplest walker: a heel strikes at phi = 2 theta, but not where the legs pass each other.
 WALKER = """

@@ -9,16 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import fsolve
+from typed import typed
 
 import contfric as cf
-
-
-def typed(tmp_path, text: str) -> cf.Model:
-    """Return a model of a file with this text."""
-    path = tmp_path / "model.yaml"
-    path.write_text(text.lstrip())
-    return cf.load_model(path)
-
 
 #: A pendulum that its anchor strikes each time it passes the middle, in the direction of its motion.
 ANCHOR = """

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -86,13 +87,6 @@ modes:
   cull: {in: {threshold: +}, field: {x: r*x*(1 - x/K) - eat, y: mu*eat - m*y - E*y}}
 spread: {x: 3, y: 2}
 """
-
-
-def typed(folder, text: str) -> cf.Model:
-    """Return a model from the text of its file."""
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
 
 
 def test_modes_may_be_called_plus_and_minus(tmp_path) -> None:
