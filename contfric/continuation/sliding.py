@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.holds_forward import with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
@@ -49,6 +50,8 @@ def sliding_events(
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     point, here = _pulled_in(orbit, before, point, settings)
+    if not _is_inside(here):
+        point, here, first = with_holds_forward(here, before, point, settings, first)
     first = _stop_after(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together, known = _TOGETHER, 0.0
