@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.holds_forward import with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
@@ -40,21 +43,15 @@ def sliding_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings
 ) -> list[tuple[Bifurcation, Point]]:
     """Return the sliding event that ends the branch between two points, if there is one."""
-    from contfric.continuation.bracket import BY_TEST
-
-    located: list[tuple[int, Point]] = []
-    for k, value in enumerate(after.tests[: len(orbit.system.tests)].tolist()):
-        if value < 0.0:
-            point = locate_change(orbit, before, after, settings, BY_TEST, k)
-            if point is not None:
-                located.append((k, point))
-    if not located:
+    located = _first_located(orbit, before, after, settings)
+    if located is None:
         return []
-    # what comes first ends the branch; what vanishes with it is of its group
-    first, point = min(located, key=lambda pair: pair[1].arc)
+    first, point = located
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
     point, here = _pulled_in(orbit, before, point, settings)
+    if not _is_inside(here):
+        point, here, first = with_holds_forward(here, before, point, settings, first)
     first = _stop_after(here, point, first)
     kind = kind_of_margin(orbit.system, orbit.system.tests[first], here)
     together, known = _TOGETHER, 0.0
@@ -85,6 +82,35 @@ def sliding_events(
     point.rough = rough
     known = ROUGHLY_REACHED if rough else known
     return [(replace(found, bound=max(found.accuracy, known)) if known > 0.0 else found, point)]
+
+
+def _first_located(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> tuple[int, Point] | None:
+    """Return the violated margin that vanishes first, and where; None if none can be located.
+
+    What comes first ends the branch; what vanishes with it is of its group. They are asked in the order of
+    their secants: one that is still positive where another vanishes vanishes behind it, and is not located.
+    """
+    from contfric.continuation.bracket import BY_TEST
+
+    count = len(orbit.system.tests)
+    violated = np.flatnonzero(after.tests[:count] < 0.0)
+    left = np.clip(before.tests[violated], 0.0, 1e3)
+    order = np.argsort(left / (left - after.tests[violated]), kind="stable")
+    found: list[tuple[float, int, Point]] = []
+    first: Point | None = None
+    for k in violated[order].tolist():
+        if first is not None and not first.lost and first.tests[k] > _TOGETHER:
+            continue
+        point = locate_change(orbit, before, after, settings, BY_TEST, k)
+        if point is not None:
+            found.append((point.arc, k, point))
+            first = min(found, key=lambda item: item[:2])[2]
+    if first is None:
+        return None
+    _, k, first = min(found, key=lambda item: item[:2])
+    return k, first
 
 
 def _pulled_in(

@@ -253,3 +253,28 @@ def test_what_is_solved_is_determined(seed: int) -> None:
             continue
         inverse = np.linalg.inv(assembled(orbit.system, orbit.joints, orbit.vector))
         assert np.max(np.abs(inverse)) * orbit.model.rounding < DETERMINED
+
+
+@pytest.mark.slow
+def test_where_two_holds_end_together_the_branch_ends_with_both() -> None:
+    """Four orbits are next to such an event, two of them with one hold of negative length."""
+    params = {
+        "Omega": 0.11178554286530032,
+        "S": 0.017432193156589813,
+        "S0": 0.021965405542497998,
+        "h": -0.10669269216044042,
+        "zeta": 0.0001622256486222396,
+    }
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    range_ = (-0.23908159485669728, 0.03418848256440038)
+    diagram = cf.explore(orbit, "h", range_, max_branches=85)
+    together = 0
+    for branch in diagram.branches:
+        for tip in (branch[0], branch[-1]):
+            assert tip.admissible, branch
+            lasts = tip.ends[:, 0] - tip.cycle[:, 0]
+            short = [lasts[hold.segment] for hold in tip.system.holds if lasts[hold.segment] < 1e-4]
+            # the square of a length is what is located, to about 1e-13
+            assert not short or min(short) > -1e-6, branch
+            together += len(short) > 1
+    assert together
