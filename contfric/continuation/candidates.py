@@ -117,7 +117,7 @@ def _relations(
 ) -> list[Relation] | None:
     """Return the linear relations of the forms; None if one is not clear."""
     model = incident.unit.model
-    if active is None or incident.wide or model.autonomous or model.composed:
+    if active is None or incident.wide or model.composed:
         return None  # composed: the first sequence is right, and its relation the dearest part
     found = []
     for form in forms:

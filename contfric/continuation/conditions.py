@@ -17,6 +17,9 @@ be left touches zero. For w > 0 it lasts. For w < 0 there are a slide from -2 d 
 a second hold. The slide moves the mass by the fourth power of d, the square of w. So to first order the
 relation of this form is that of the form with one hold; its inequality is -w >= 0 in place of w >= 0.
 
+Without excitation every unit ends at time 0 (:mod:`contfric.orbit.clock`): the time of u is minus the
+duration of its unit, and that of u' has no column. So the ring of a sequence is regular there, too.
+
 For a sequence of n units these are n (m + k) + n units' joints and one lambda: a ray on each side. A sequence
 exists on a side if its ray obeys all inequalities. For locations with two outcomes each this is the linear
 complementarity problem of docs/bridges.md, written so that an outcome of any kind fits.

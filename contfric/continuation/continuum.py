@@ -34,6 +34,9 @@ _LENGTH = 1e-6
 _ONE = 1e-7
 #: Points in a row from which multipliers at 1 are no event: of one, its two neighbours would be farther away.
 _RUN = 4
+#: Share of 1 + its value by which the parameter changes over them: a multiplier that is 1 at a branch point
+#: changes in proportion to the parameter, and a hundred times the number above is seen of it.
+_CHANGES = 1e-5
 #: Distance to the neighbour in a continuum (root mean square of joints): far from rounding, and near enough
 #: for Newton's method.
 _BESIDE = 1e-3
@@ -101,6 +104,8 @@ def continua_of(branch: Branch) -> Iterator[str]:
     at_one = np.min(away, axis=1) < _ONE
     for first, last in _runs(at_one):
         low, high = sorted((values[first], values[last]))
+        if high - low < _CHANGES * (1.0 + abs(high)):
+            continue
         yield (
             f"a continuum of orbits at each {name} between {low:.10g} and {high:.10g}: "
             "a multiplier is 1 all along"

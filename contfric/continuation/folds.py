@@ -94,7 +94,10 @@ def fold_at(
     split = as_split(vertex[0], point.tangent)
     if split is not None:
         return [(split, point)]
-    vertical = _is_vertical(before, after, settings, point) or _is_jump(before, point, after)
+    # of a bridge nothing but the parameter tells a fold
+    known = vertex[0].accuracy * settings.width if settings.stability else 0.0
+    vertical = not _turns(before, point, after, known) and _is_vertical(before, after, settings)
+    vertical = vertical or _is_jump(before, point, after)
     return [] if vertical or _is_idle(orbit, before, point, after, settings) else [vertex]
 
 
@@ -143,25 +146,27 @@ def vertex_at(orbit: Orbit, point: Point, settings: Settings) -> Bifurcation | N
     return None if found.kind is Kind.SN else found
 
 
-def _is_vertical(
-    before: Point, after: Point, settings: Settings, between: Point | None = None
-) -> bool:
+def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
     """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
 
-    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1. Without
-    multipliers (on a bridge) a parameter that is beyond that of the fold on neither side, by more than
-    rounding, turns.
+    At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1.
     """
     slopes = max(abs(before.slope), abs(after.slope))
     if slopes > _VERTICAL or abs(after.value - before.value) > _CONSTANT * settings.width:
         return False
     if not settings.stability:
-        if between is None:
-            return True
-        gaps = [side.value - between.value for side in (before, after)]
-        least = _ROUNDING * (1.0 + abs(between.value))
-        return not (gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > least)
+        return True
     return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
+
+
+def _turns(before: Point, point: Point, after: Point, known: float) -> bool:
+    """Tell whether a parameter turns at a point that is known to an error, however slowly it does.
+
+    On both sides its values lie on one side of that at the fold, and farther away than errors are.
+    """
+    gaps = [side.value - point.value for side in (before, after)]
+    least = max(known, _ROUNDING * (1.0 + abs(point.value)))
+    return gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > least
 
 
 def _is_jump(before: Point, point: Point, after: Point) -> bool:

@@ -84,3 +84,38 @@ def test_exit_that_is_tangential_to_rounding() -> None:
             assert normal_location(test, moved) in places
             asked += 1
     assert asked
+
+
+def relay(seed: int) -> Diagram:
+    """Return the diagram of a random relay that slides, whose orbits come to touch the surface."""
+    rng = np.random.default_rng([7, seed])
+    about = {"zeta": 0.05, "lam": 0.05, "k": 1.0, "sigma": -1.0, "rho": 1.0}
+    params = {name: value * (1.0 + rng.uniform(-0.2, 0.2)) for name, value in about.items()}
+    orbit = cf.find_orbit("relay-sliding", params | {"w": 10.0}, longest=1000)
+    return cf.explore(orbit, "w", (9.0, 11.5), max_periods=2)
+
+
+def test_touches_of_motion_without_excitation() -> None:
+    """Each outcome exists on the side that is told; orbits that do both in turn exist on none."""
+    asked = 0
+    for seed in range(3):
+        found = relay(seed)
+        active = found.model.index_of(found.parameter)
+        for event in found.of_kind("GS"):
+            incident = incident_forms(event)
+            if len(incident.forms) != 2:
+                continue
+            known = [relation_of(form, active, incident.least) for form in incident.forms]
+            relations = [relation for relation in known if relation is not None]
+            assert len(relations) == 2
+            told = possible(relations, [(0,), (1,)])
+            node = next(n for n in found.events if n.bifurcation is event)
+            here = [found.branches[index] for index in node.branches]
+            for form, sides in zip(incident.forms, told, strict=True):
+                own = [b for b in here if len(b.system.itinerary) == len(form.itinerary)]
+                ahead = [_ahead(branch, event.params["w"]) for branch in own]
+                assert [(not above, above) for above in ahead] == [sides]
+            for in_turn in ((0, 1), (0, 0, 1), (0, 0, 0, 1), (0, 0, 1, 1)):
+                assert possible(relations, [in_turn]) == [(False, False)]
+            asked += 1
+    assert asked
