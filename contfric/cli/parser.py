@@ -210,7 +210,12 @@ def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add("--state", metavar="X,V", help="initial state, numbers joined by commas")
     add("--time", type=_number, default=0.0, help="initial time (%(default)s)")
     add("--domain", help="initial domain, where the state alone does not decide")
-    add("--periods", type=_number, default=100.0, help="excitation periods (%(default)s)")
+    add(
+        "--periods",
+        type=_number,
+        default=100.0,
+        help="periods of excitation or clock (%(default)s)",
+    )
     add("--events", type=_count, default=1_000_000, help="most events to follow (%(default)s)")
     add("--find", action="store_true", help="say on stderr what the solution converges to")
 

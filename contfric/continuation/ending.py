@@ -195,7 +195,7 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         if thrown_at(orbit, met) or entered_at(orbit.system, met):
             return bifurcation.meaning
         return "grazing impact: the wall is just touched"
-    if any(entered_at(orbit.system, test) for test in bifurcation.tests):
+    if any(entered_at(orbit.system, t) or thrown_at(orbit, t) for t in bifurcation.tests):
         return bifurcation.meaning
     if {test.surface for test in bifurcation.tests} & orbit.model.settled_sides.keys():
         return (

@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
-from contfric.models.definition import Domain, Model
+from contfric.models.definition import Domain, FloatArray, Model
 from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import is_section
@@ -157,19 +157,74 @@ def thrown_at(orbit: Orbit, test: EventFunction) -> str:
     """Return the surface of a reset that takes what just touches it somewhere else; else nothing.
 
     An impact changes nothing at a touch, as ``v -> -e v`` at v = 0. A reset off its surface does, and so does
-    one along it (a neuron that fires begins at x = 0, whatever x was).
+    one along it (a neuron that fires begins at x = 0, whatever x was). What the reset does not map on the way
+    there it may map on the way back (``from: [falls]``).
     """
-    reset = orbit.model.reset_at(orbit.itinerary[test.segment][0], test.surface)
+    reset = orbit.model.reset_by_surface.get(test.surface)
     if reset is None or reset.wraps or test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return ""
+    mode = orbit.itinerary[test.segment][0]
+    acts = orbit.model.reset_at(mode, test.surface) is not None
     try:
         inside = test.margin is Margin.INTERIOR
         touch = touch_of(orbit, test.segment, test.surface) if inside else orbit.ends[test.segment]
     except NotationError:  # nothing is touched inside
-        return "" if reset.stays else test.surface
+        return test.surface if acts and not reset.stays else ""
+    if not acts:
+        back = coming_back(orbit, mode, test.surface, touch)
+        if back is None or not orbit.model.maps_at(back, test.surface):
+            return ""
+        after = orbit.model.targets[back.name, test.surface]
+        whole = orbit.model.whole_mode(mode)
+        if all(orbit.model.domain_by_name[name].mode != whole for name in after):
+            return test.surface
     image = orbit.flow.reset(test.surface, float(touch[0]), touch[1:])
     moved = np.max(np.abs(image - touch[1:]))
     return test.surface if moved > _PASSED * (1.0 + np.max(np.abs(touch[1:]))) else ""
+
+
+def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Domain | None:
+    """Return the domain in which motion that just crosses a surface comes back to it; None if it does not.
+
+    Other surfaces that it meets at the touch, such as v = 0, are crossed between, in the direction of their
+    rates.
+    """
+    model = orbit.model
+    if model.composed:
+        return None
+    t, y = float(touch[0]), touch[1:]
+    heights = {s.name: orbit.flow.height(s.name, t, y) for s in model.surfaces if s.name != surface}
+    met = {name for name, height in heights.items() if abs(height) <= _PASSED}
+
+    def rate(domain: Domain, name: str) -> float:
+        return orbit.flow.rate(domain.own_mode, model.surface_by_name[name].observable, t, y)
+
+    def holds(domain: Domain, ahead: bool) -> bool:
+        turn = 1.0 if ahead else -1.0
+        return all(
+            domain.signs[name] * (turn * rate(domain, name) if name in met else height) >= 0.0
+            for name, height in heights.items()
+        )
+
+    before = next((d for d in model.domains_of(model.whole_mode(mode)) if holds(d, False)), None)
+    behind = None if before is None else model.transitions.get((before.name, surface))
+    if behind is None:
+        return None
+    found = model.domain_by_name[behind]
+    for name in sorted(met):
+        onwards = model.transitions.get((found.name, name))
+        if onwards is not None and found.signs[name] * rate(found, name) < 0.0:
+            found = model.domain_by_name[onwards]
+    speeds_up = _second_rate(orbit, found.own_mode, surface, t, y)
+    return found if found.signs[surface] * speeds_up < 0.0 else None
+
+
+def _second_rate(orbit: Orbit, mode: str, surface: str, t: float, y: FloatArray) -> float:
+    """Return how fast the rate of a surface's observable changes along a mode."""
+    observable = orbit.model.surface_by_name[surface].observable
+    moved = orbit.flow.rate_gradient(mode, observable, t, y, 0)
+    speed = orbit.flow.jacobian(mode, t, y, 0.0)[:, 1 + len(y)]
+    return float(moved[0] + moved[1 : 1 + len(y)] @ speed)
 
 
 def leads_elsewhere(orbit: Orbit, test: EventFunction) -> bool:

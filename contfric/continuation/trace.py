@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.corners import ends_at_corner
@@ -172,6 +174,8 @@ def trace_side(
             may_be = side.autonomous and side.end.reason in _MAY_BE_ENDLESS
             if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
+            if side.end.reason is EndReason.PERIOD:
+                _forget_rounding(side, settings)
             side.rows = side.rows.first(side.last + 1)
             return side
 
@@ -183,6 +187,24 @@ _MAY_BE_ENDLESS = frozenset(
 )
 #: Why an orbit with chatter is not finite beyond a point.
 _NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
+
+
+#: Rounding of a parameter value that an orbit has been solved with, relative to 1 + its size.
+_ROUNDED = 64.0 * float(np.finfo(float).eps)
+
+
+def _forget_rounding(side: Side, settings: Settings) -> None:
+    """Leave out what has not been located where the period grows at one value of the parameter.
+
+    Points there differ by rounding alone, and so do their multipliers: they change sign for no reason.
+    """
+    end = side.tip.value
+    side.bifurcations = [
+        event
+        for event in side.bifurcations
+        if event.located
+        or abs(event.params[settings.parameter] - end) > _ROUNDED * (1.0 + abs(end))
+    ]
 
 
 def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:

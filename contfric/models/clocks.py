@@ -22,6 +22,7 @@ from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.entries import EntryError, mapping_in
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
+from contfric.models.slow_time import check_time
 
 #: What the clock and its surface are called, and the function that stands for it.
 CLOCK, TICK, MOD = "clock", "tick", "mod"
@@ -55,6 +56,11 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
         raise EntryError((), f"{MOD}(t, T) needs the period T of the model: write 'period: ...'")
     _check_names(data)
     reader = _Reader(str(period), data)
+    values = {name: reader.value(ast.Name(name, ast.Load())) for name in reader.parameters}
+    timed = [pair for pair in _expressions(data) if pair[0][0] != "define"]
+    define = {str(name): str(text) for name, text in mapping_in(data, "define").items()}
+    every = value_at_defaults(str(period), data)
+    check_time(timed, define, values, every, _is_mod)
     found = {
         key: _rewritten(value, (key,), depth, reader)
         for key, value in data.items()

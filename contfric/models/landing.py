@@ -100,11 +100,7 @@ class Landing:
     ) -> int:
         own = surface == self.surface
         named = {lead.mode for lead in self.leads}
-        if (
-            named
-            and not own
-            and {d.signs[surface] for d in self.domains if d.own_mode in named} == {0}
-        ):
+        if named and {d.signs[surface] for d in self.domains if d.own_mode in named} == {0}:
             return 0  # it leads into motion on that surface
         verdicts, asked, passed = Counter[int](), Counter[int](), True
         for before, t, y in images:

@@ -18,6 +18,7 @@ from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.starts import signs_at
+from contfric.orbit.time_scale import clock_period
 
 #: Longest period that is looked for, in periods of the excitation.
 MOST_PERIODS = 64
@@ -107,8 +108,9 @@ def _parting(trajectory: Trajectory) -> str:
     if model.autonomous:  # a unit of time says nothing of how often something happens
         passed = float(trajectory.last[1]) - trajectory.begin[0]
         compared = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
+    length = compared / clock_period(model, model.vector(trajectory.params))
     one, other = (
-        simulate(model, trajectory.params, state=begin, time=time, periods=compared)
+        simulate(model, trajectory.params, state=begin, time=time, periods=length)
         for begin in (state, state + shift)
     )
     if {one.end, other.end} != {SimulationEnd.TIME}:

@@ -21,7 +21,7 @@ from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import centred, refine_with_symmetry
 from contfric.orbit.system import build_system
-from contfric.orbit.time_scale import time_scale
+from contfric.orbit.time_scale import clock_period, time_scale
 from contfric.remember.journal import remembered
 from contfric.signature.cyclic import primitive_length
 
@@ -112,11 +112,11 @@ def _settled(
         if progress is not None:
             progress(f"simulating: {done} periods without an orbit, then {text}")
 
-    unit = time_scale(model)
+    unit, clock = time_scale(model), clock_period(model, model.vector(params))
 
     def simulated(events: int) -> Trajectory:
         """Follow the solution from its start, to a time and not to an event where that is gone on with."""
-        asked = span * unit
+        asked = span * unit / clock
         return simulate(
             model, params, state=state, time=time, periods=asked, events=events, progress=heard
         )

@@ -26,7 +26,7 @@ from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import surfaces_under, tables
-from contfric.orbit.time_scale import time_scale
+from contfric.orbit.time_scale import clock_period, time_scale
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,7 +183,7 @@ def simulate(
     model, params : the model (or its name) and its parameters; defaults fill in
     state : initial state, shape (n,); by default the model's rest position shifted by its spread
     time : initial time, nondimensional
-    periods : time to follow, in periods of the excitation (units of time if there is none)
+    periods : time to follow, in periods of the excitation or of the clock (units of time if there is none)
     events : most events to follow
     domain : initial domain, where the state alone does not decide
     progress : called with one line of text now and then
@@ -206,7 +206,8 @@ def simulate(
     events = whole_number("events", events, least=1)
     function_of("progress", progress)
     mode, on = start_of(model, time, y, vector, domain)
-    return run(model, vector, mode, on, time, y, periods, events, progress)
+    length = periods * clock_period(model, vector)
+    return run(model, vector, mode, on, time, y, length, events, progress)
 
 
 def go_on(trajectory: Trajectory, periods: float, progress: Progress | None = None) -> Trajectory:

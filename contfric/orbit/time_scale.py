@@ -15,7 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from contfric.models.definition import Model
+from contfric.models.clocks import CLOCK, TICK
+from contfric.models.definition import FloatArray, Model
 
 #: States that are sampled, and the unit of time that is a matter of taste: nothing is changed below it.
 _STATES, _LONG = 12, 100.0
@@ -48,3 +49,19 @@ def time_scale(model: Model) -> float:
             times.append(1.0 / fastest)
     slowest = max(times, default=1.0)
     return slowest if _LONG < slowest < np.inf else 1.0
+
+
+def clock_period(model: Model, vector: FloatArray) -> float:
+    """Return the time from tick to tick of a model with a clock, 1 of all others.
+
+    Such a model is autonomous to the engine; what its user calls a period is that of ``mod(t, T)``.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> buck = cf.load_model("buck")  # 400 microseconds, in units of 100
+    >>> round(clock_period(buck, buck.vector({})), 12)
+    4.0
+    """
+    ticks = CLOCK in model.states and any(reset.surface == TICK for reset in model.resets)
+    return model.view(vector).level(TICK) if ticks else 1.0

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -31,6 +32,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.system import IntArray
+from contfric.orbit.time_scale import clock_period
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
 from contfric.response.basins import Basins
@@ -105,7 +107,7 @@ def basins(
     at : values of the other states, and "phase", that of the start as a share of the period; 0 by default
     orbits : orbits that are known: a :class:`~contfric.Diagram` that contains the parameters, or a list of
         orbits; others are found all the same
-    periods : periods of the excitation (units of time without one) that a start is followed
+    periods : periods of the excitation or of the clock (units of time without) that a start is followed
     executor : any :class:`concurrent.futures.Executor`: processes, loky, dask, MPI; by default threads
         of this process. What it loses is computed here.
     folder : where finished tiles are kept; the same call goes on from them
@@ -137,7 +139,7 @@ def basins(
     periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)
     shape = tuple(len(values) for values in axes.values())
     _check_size(model, axes)
-    period = model.view(vector).period
+    period, periods = model.view(vector).period, ceil(periods * clock_period(model, vector))
     states = _states(model, axes, fixed)
     job = _BasinJob(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)

@@ -15,6 +15,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
+from contfric.orbit.time_scale import clock_period
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following, Points
 from contfric.response.outcome import Outcome
@@ -47,8 +48,8 @@ def poincare(
         of its period; by default the stops, or phase 0 where an excited model has none, such as a structure
     sense : of a surface: "either", "rising" or "falling"
     state, time : initial condition; by default displaced from rest at time 0
-    periods, transient : periods of the excitation (units of time without one) of which points are
-        collected, and before that
+    periods, transient : periods of the excitation or of the clock (units of time without) of which
+        points are collected, and before that
     progress : called with one line of text now and then
 
     Raises
@@ -70,7 +71,8 @@ def poincare(
     y, begins = checked_state(model, vector, state), real_number("time", time)
     function_of("progress", progress)
     skipped = real_number("transient", transient, least=0.0)
-    how = Following(skipped, skipped + positive("periods", periods), 0.0, _ALL, 0)
+    span, clock = skipped + positive("periods", periods), clock_period(model, vector)
+    how = Following(skipped * clock, span * clock, 0.0, _ALL, 0)
     at, one = np.array([begins]), np.array([-1], dtype=np.int64)
     points, ends = collect(
         model, cut, how, vector[None], (at, y[None], one, 0 * one), None, progress

@@ -23,6 +23,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
 from contfric.orbit.system import IntArray
+from contfric.orbit.time_scale import clock_period
 from contfric.response.collecting import repeats_of
 from contfric.response.cuts import Cut, Following
 from contfric.response.outcome import Outcome
@@ -108,8 +109,8 @@ def sweep(
     parameter, values : the parameter that varies, and its values, ascending
     both : True for up and down, False for up alone: ``direction`` in one word
     direction : "both", "up" or "down"; each begins with ``state`` at its own end
-    periods, transient : periods of the excitation (units of time without one) of which points are collected,
-        and before that
+    periods, transient : periods of the excitation or of the clock, the longest where it varies (units of time
+        without), of which points are collected, and before that
     section : "stops", "releases", a surface of the model by its name, or a phase of the excitation as a share
         of its period; by default the stops, or phase 0 where an excited model has none, such as a structure
     sense : of a surface: "either", "rising" or "falling"
@@ -137,13 +138,8 @@ def sweep(
     function_of("progress", progress)
     section = usual_section(model) if section is None else section
     cut = section_of(model, section, sense)
-    how = Following(
-        real_number("transient", transient, least=0.0),
-        real_number("transient", transient, least=0.0) + positive("periods", periods),
-        repeats_of(model),
-        np.iinfo(np.int64).max,
-        1,
-    )
+    skipped = real_number("transient", transient, least=0.0)
+    span = skipped + positive("periods", periods)
     if both is not None:
         direction = "both" if both else "up"
     if direction not in [*_DIRECTIONS]:
@@ -156,10 +152,12 @@ def sweep(
     defined = _defined(model, parameter, grid, fixed)
     example = model.check_params({**fixed, parameter: float(grid[defined[0]])})
     vector, starts = model.vector(example), {}
+    at = np.tile(vector, (len(defined), 1))
+    at[:, model.index_of(parameter)] = grid[defined]
     for name in _DIRECTIONS[direction]:
-        at = vector.copy()
-        at[model.index_of(parameter)] = grid[defined[0 if name == "up" else -1]]
-        starts[name] = checked_state(model, at, state)
+        starts[name] = checked_state(model, at[0 if name == "up" else -1].copy(), state)
+    clock = max(clock_period(model, one) for one in at)
+    how = Following(clock * skipped, clock * span, repeats_of(model), np.iinfo(np.int64).max, 1)
     job = _SweepJob(
         model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts
     )

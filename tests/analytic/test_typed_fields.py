@@ -275,3 +275,42 @@ def test_a_mode_on_both_sides_passes_where_others_leave_rest(tmp_path) -> None:
     model = typed(tmp_path, SEPIC)
     assert model.transitions["on:diode+", "diode"] == "on:diode-"
     assert model.transitions["idle", "pulse"] == "on:diode+"
+
+
+#: A child who stands up where the swing is lowest, and sits down where it turns round.
+SWING = """
+name: swing
+states: [th, w]
+parameters: {l: 1.0, d: 0.066, c: 0.1}
+autonomous: true
+surfaces: {bottom: {observable: th}, turn: {observable: w}}
+modes:
+  down+: {in: {bottom: +, turn: -}, field: {th: w, w: -sin(th)/(l + d) - c*w}}
+  up-: {in: {bottom: -, turn: -}, field: {th: w, w: -sin(th)/(l - d) - c*w}}
+  down-: {in: {bottom: -, turn: +}, field: {th: w, w: -sin(th)/(l + d) - c*w}}
+  up+: {in: {bottom: +, turn: +}, field: {th: w, w: -sin(th)/(l - d) - c*w}}
+resets: {bottom: {w: w*((l + d)/(l - d))**2}}
+symmetry: th -> -th, w -> -w
+spread: {th: 2, w: 1}
+"""
+
+
+def test_a_swing_that_comes_to_stand_on_its_head(tmp_path) -> None:
+    """Half a cycle by scipy. At its end points differ by rounding, and none is a branch point."""
+    model = typed(tmp_path, SWING)
+    orbit = cf.find_orbit(model, state=[2.0, 0.0])
+
+    def swung(d: float, th: float) -> float:
+        """Return the next turn of a swing from rest at an angle."""
+        down, up = (
+            lambda t, y, length=length: [y[1], -np.sin(y[0]) / length - 0.1 * y[1]]
+            for length in (1.0 + d, 1.0 - d)
+        )
+        _, low = until(down, [th, 0.0], lambda t, y: y[0], -1)
+        kicked = [0.0, low[1] * ((1.0 + d) / (1.0 - d)) ** 2]
+        return -float(until(up, kicked, lambda t, y: y[1], 1)[1][0])
+
+    assert swung(0.066, orbit.x_max) == pytest.approx(orbit.x_max, rel=1e-9)
+    diagram = cf.explore(orbit, "d", (0.065, 0.07))
+    assert diagram.bifurcations == ()
+    assert any(end.reason.name == "PERIOD" for b in diagram.branches for end in b.ends)

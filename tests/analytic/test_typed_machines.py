@@ -270,3 +270,29 @@ def test_a_touch_that_only_changes_the_mode_jumps(tmp_path) -> None:
     assert event.params["F"] == pytest.approx(0.2, abs=1e-10)
     assert "the map jumps" in event.meaning
     assert diagram.verify().passed
+
+
+#: A capacitor that is charged in part of each period, and drained in the rest.
+LATCHED = """
+name: latched
+states: [u]
+parameters: {Ts: 0.3, peak: 0.7, g: 0.4}
+period: Ts
+surfaces: {trip: {observable: u, level: peak}}
+modes: {on: {in: {trip: -}, field: {u: 1/Ts}}, off: {field: {u: -g*u/Ts}}}
+resets: {tick: {to: on}}
+spread: {u: 1}
+"""
+
+
+@pytest.mark.parametrize("Ts", [0.01, 7.0])
+def test_periods_are_those_of_the_clock(tmp_path, Ts: float) -> None:
+    """Eight periods have eight ticks, whatever the unit of time is; they were units of time."""
+    model = typed(tmp_path, LATCHED)
+    found = cf.simulate(model, {"Ts": Ts}, state=[0.1], periods=8.01)
+    assert [k for _, k in found.itinerary].count("tick") == 8
+    assert found.last[1] == pytest.approx(8.01 * Ts, rel=1e-12)
+    how = {"section": "tick", "periods": 8, "transient": 0}
+    assert len(cf.poincare(model, {"Ts": Ts}, [0.1], **how).times) == 8
+    swept = cf.sweep(model, "Ts", [Ts, 2 * Ts], both=False, **how).up  # the longest of both periods
+    assert max(np.bincount(swept.index)) <= 16

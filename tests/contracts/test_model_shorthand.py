@@ -73,6 +73,14 @@ RAMP = "low + (high - low)*{}/Ts"
         ("relay", "modes/up/field/v", "-2*zeta*v - x // 2", "modes", "no whole division"),
         ("relay", "modes/up/field/v", "-2*zeta*v - mod(x, 2)", "", "the period T of the model"),
         ("buck", "define/ramp", RAMP.format("mod(t, Q)"), "define", "unknown name 'Q'"),
+        (
+            "buck",
+            "define/ramp",
+            RAMP.format("mod(t, Ts) + t"),
+            "observables",
+            "not the same a period",
+        ),
+        ("buck", "modes/on/field/i", "(E + sin(pi*t/Ts) - v)/L", "modes", "not the same a period"),
         ("buck", "period", None, "", "write 'period: ...'"),
         ("buck", "define/clock", "1.0", "", "give other names to yours"),
         ("buck", "symmetry", "v -> -v, t -> t + T/2", "symmetry", "the clock"),
@@ -105,6 +113,13 @@ def test_percent_and_T_are_the_same_clock() -> None:
         assert other.states == typed.states == ("v", "i", "clock")
         a, b = (cf.find_orbit(m) for m in (typed, other))
         assert np.allclose(a.joints, b.joints, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("text", ["sin(2*pi*t/Ts)", "cos(t*6*pi/Ts)", "abs(sin(pi*t/Ts))", "0*t"])
+def test_time_outside_of_a_clock_that_begins_again_with_it(text: str) -> None:
+    """It is the same with the time since the last tick."""
+    model = built(describe(changed("buck", "modes/on/field/i", f"(E + {text} - v)/L")))
+    assert model.states == ("v", "i", "clock")
 
 
 @pytest.mark.parametrize("name", ["buck", "pendulum", "relay-sliding", "relay", "rimless-wheel"])
