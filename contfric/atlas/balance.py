@@ -23,7 +23,9 @@ from contfric.continuation.side import first_point
 from contfric.continuation.touching import leads_elsewhere
 from contfric.continuation.unit import unit_of
 from contfric.errors import ContfricError
+from contfric.orbit.conserved import conserved
 from contfric.orbit.index import index_at_infinity, index_of
+from contfric.orbit.margins import EventFunction
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import simulate
 from contfric.orbit.solve import refine
@@ -139,9 +141,26 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
                 below = above = None
             if any(t.surface in e.orbit.model.settled_sides for e in events for t in e.tests):
                 below = above = None  # incomplete chatter: beyond it branches are infinitely many
-            if _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
+            lost = any(_frees(e.orbit, test) for e in events for test in e.tests)
+            if lost or _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
                 below = above = None  # beyond it orbits have another offset, each of a continuum
             yield Balance(number, b.label, value, times * period, below, above)
+
+
+def _frees(orbit: Orbit, test: EventFunction) -> bool:
+    """Tell whether a solution that goes beyond an event does not keep what its orbit conserves."""
+    kept, model = len(orbit.system.layout.conserved), orbit.model
+    if not kept:
+        return False
+    mode = model.whole_mode(orbit.itinerary[test.segment][0])
+    targets = {
+        t for d in model.domains_of(mode) for t in model.targets.get((d.name, test.surface), ())
+    }
+    return any(
+        len(conserved(model, (*orbit.itinerary, (model.domain_by_name[t].mode, test.surface))))
+        < kept
+        for t in targets
+    )
 
 
 def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
@@ -353,8 +372,8 @@ def _sum_at(diagram: Diagram, value: float) -> int | None:
             continue
         for orbit in orbits_at(branch, value):
             index = index_of(orbit)
-            if index is None:
-                return None
+            if index is None or len(orbit.system.layout.conserved):
+                return None  # one of a continuum, which has an index as a whole
             total += index
     return total
 

@@ -13,9 +13,10 @@ state (a slide, ``x' = v > 0``), nor where a state that is no angle has a consta
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
@@ -74,14 +75,24 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         key: {**entry, "in": {**(entry.get("in") or {}), name: "+"}}
         for key, entry in (data.get("domains") or {}).items()
     }
+    forces = {
+        contact: {**laws, "modes": _with_parts(laws["modes"], parts)}
+        for contact, laws in (data.get(FORCES) or {}).items()
+    }
     return {
         **({"domains": named} if named else {}),
+        **({FORCES: forces} if forces else {}),
         "observables": {**(data.get("observables") or {}), name: formula},
         "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         "modes": modes,
         "resets": named_parts(data.get("resets") or {}, parts),
         KEY: name,
     }
+
+
+def _with_parts(laws: Mapping[str, str], parts: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return which law of a contact holds in each mode, where modes are in parts."""
+    return {part: law for mode, law in laws.items() for part in parts.get(mode, (mode,))}
 
 
 def _staying(description: Description) -> list[ModeText]:
@@ -113,7 +124,14 @@ def _may_stay(sampler: Sampler, mode: ModeText, sides: Mapping[str, int]) -> boo
     """Tell whether no rate of a mode keeps its sign all over the region."""
     evaluator, params = sampler.evaluator, sampler.params
     points, moves = list(sampler.states(_POINTS)), False
-    heights = [[evaluator.height(name, params, t, y) for t, y in points] for name in sides]
+    heights, rested = (
+        [
+            [evaluator.height(s, params, t, y) for t, y in points]
+            for s, side in sides.items()
+            if (side == 0) is on
+        ]
+        for on in (False, True)
+    )
     for state, text in zip(evaluator.description.states, mode.field, strict=True):
         rates = [evaluator.value(text, params, t, y) for t, y in points]
         if max(rates) - min(rates) <= _SAME * (1.0 + abs(rates[0])):
@@ -121,6 +139,8 @@ def _may_stay(sampler: Sampler, mode: ModeText, sides: Mapping[str, int]) -> boo
                 return False
             continue
         moves = True
+        if any(proportional(rates, height) for height in rested):
+            continue  # the velocity of what rests on a surface
         if any(proportional(rates, height) for height in heights):
             return False
     return moves

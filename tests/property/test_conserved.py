@@ -250,3 +250,66 @@ def test_what_grows_on_one_side_grows_in_some_of_its_modes_only() -> None:
     both = (("nns", "strong-"), ("nnn", "weak"))
     assert only_grows(model, up + down[:2] + both + down[3:]) == ()
     assert only_grows(model, (("pps", "weak"), *down)) == ()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_structure_of_which_friction_never_slips_moves_as_a_linear_one(seed: int) -> None:
+    """The masses at rest are taken out of the matrices; what is left is solved as a linear system."""
+    draw = np.random.default_rng(seed)
+    n, rubbing = int(draw.integers(2, 6)), int(draw.integers(1, 3))
+    held = sorted(draw.choice(n, min(rubbing, n - 1), replace=False).tolist())
+    chain = np.diag(2.0 + draw.random(n)) - np.eye(n, k=1) - np.eye(n, k=-1)
+    mass, amplitudes, w = 1.0 + draw.random(n), draw.normal(size=n), 0.3 + draw.random()
+    model = cf.Mechanism(
+        mass.tolist(),
+        0.2,
+        chain,
+        contacts={
+            f"c{i}": {"kind": "friction", "velocity": f"v{i + 1}", "kinetic": 50, "static": 60}
+            for i in held
+        },
+        force={
+            f"q{i + 1}": f"{a!r}*cos(w*t) + {a!r}*sin(2*w*t)"
+            for i, a in enumerate(map(float, amplitudes))
+        },
+        parameters={"w": w},
+        period="2*pi/w",
+    )
+    rest = draw.normal(size=n) * np.isin(range(n), held)
+    orbit = cf.find_orbit(model, state=[*rest, *np.zeros(n)])
+    free = [i for i in range(n) if i not in held]
+    own = np.ix_(free, free)
+    waves = [
+        np.linalg.solve(
+            chain[own] - (k * w) ** 2 * np.diag(mass)[own] + 0.2j * k * w * np.eye(len(free)), f
+        )
+        for k, f in ((1, amplitudes[free]), (2, -1j * amplitudes[free]))
+    ]
+    middle = np.linalg.solve(chain[own], -chain[np.ix_(free, held)] @ rest[held])
+    t = orbit.joints[:, 0]
+    moved = [
+        np.real(x * np.exp(1j * k * w * t[:, None])) for k, x in zip((1, 2), waves, strict=True)
+    ]
+    assert orbit.joints[:, 1:][:, free] == pytest.approx(middle + sum(moved), abs=1e-9)
+    assert orbit.joints[:, 1:][:, held] == pytest.approx(
+        np.tile(rest[held], (len(t), 1)), abs=1e-12
+    )
+    assert orbit.admissible
+    assert [orbit.quantity(f"work(c{i})") for i in held] == [0.0] * len(held)
+    assert all(abs(orbit.quantity(f"max(force(c{i}))")) < 60.0 for i in held)
+
+
+def test_indices_are_not_summed_where_a_contact_that_rests_begins_to_slip() -> None:
+    """Where it slips its map jumps; the orbits at rest are a continuum, which has an index as a whole."""
+    model = cf.Mechanism(
+        [1.0, 1.0],
+        0.05,
+        [["2", "-1"], ["-1", "2"]],
+        contacts={"c": {"kind": "friction", "velocity": "v2", "kinetic": "0.5", "static": "0.6"}},
+        force={"q1": "0.2*cos(w*t)"},
+        parameters={"w": 0.9},
+        period="2*pi/w",
+    )
+    diagram = cf.explore(cf.find_orbit(model, state=[0.0, 0.1, 0.0, 0.0]), "w", (0.8, 1.4))
+    assert any(b.kind in (cf.Kind.AS, cf.Kind.GS) for b in diagram.bifurcations)
+    assert diagram.verify().passed
