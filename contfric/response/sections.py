@@ -106,8 +106,8 @@ def _on_surface(model: Model, section: str, sense: int) -> Cut:
         raise ParameterError(
             f"model '{model.name}' has no surface on which it stops: a section is {_choices(model)}"
         )
-    hint = did_you_mean(section, [*surfaces, *model.kinks, STOPS, RELEASES])
-    raise ParameterError(f"no section '{section}'{hint}; a section is {_choices(model)}")
+    valid = f"{did_you_mean(section, _named(model))}{_or_phase(model)}"
+    raise ParameterError(f"no section '{section}'{valid}")
 
 
 def _lies_on(model: Model, mode: str, surface: str) -> bool:
@@ -115,9 +115,16 @@ def _lies_on(model: Model, mode: str, surface: str) -> bool:
 
 
 def _choices(model: Model) -> str:
-    names = [f"'{STOPS}'"] if model.stop_surface else []
-    if any(mode.sliding for mode in model.modes):
-        names.append(f"'{RELEASES}'")
-    names += [f"'{s.name}'" for s in model.surfaces]
-    phase = "" if model.autonomous else ", or a phase of the excitation from 0 to 1"
-    return f"one of {', '.join(names)}{phase}"
+    names = ", ".join(f"'{name}'" for name in _named(model))
+    return f"one of {names}{_or_phase(model)}"
+
+
+def _or_phase(model: Model) -> str:
+    return "" if model.autonomous else ", or a phase of the excitation from 0 to 1"
+
+
+def _named(model: Model) -> list[str]:
+    """Return the sections of a model that have names."""
+    stops = [STOPS] if model.stop_surface else []
+    releases = [RELEASES] if any(mode.sliding for mode in model.modes) else []
+    return [*stops, *releases, *(s.name for s in model.surfaces), *model.kinks]

@@ -199,7 +199,7 @@ def test_overlay() -> None:
         ({"values": [0.5, 0.4]}, "ascending"),
         ({"values": []}, "ascending"),
         ({"direction": "sideways"}, "direction is one of"),
-        ({"section": "F"}, "no section 'F'"),
+        ({"section": "F"}, "no section 'F'.* Valid: stops, releases, F[+], F-, v, or a phase"),
         ({"section": 1.0}, "0 <= phase < 1"),
         ({"section": True}, "a section is"),
         ({"sense": "rising"}, "needs a surface"),
