@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, real_number, shown
+from contfric.models.clocks import TICK
 from contfric.models.definition import Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MAPPED, tables
@@ -21,11 +22,17 @@ _SENSES = {"either": 0, "rising": 1, "falling": -1}
 
 
 def usual_section(model: Model) -> SectionLike:
-    """Return the section to take where none is named: the stops, or a phase where the model has none.
+    """Return the section to take where none is named: the stops, else a phase, the tick or the first surface.
 
-    A structure has as many velocities that vanish as it has contacts, and no stops.
+    A structure has as many velocities that vanish as it has contacts, and no stops. A model with a clock has
+    no other time, and its tick is what a phase is of others.
     """
-    return STOPS if model.stop_surface or model.autonomous else 0.0
+    if model.stop_surface:
+        return STOPS
+    if not model.autonomous:
+        return 0.0
+    names = [surface.name for surface in model.surfaces]
+    return TICK if TICK in names else names[0] if names else STOPS
 
 
 def section_of(model: Model, section: object, sense: object = "either") -> Cut:
