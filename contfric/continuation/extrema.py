@@ -35,7 +35,8 @@ _KINK = 1e-4
 _ZERO = 1e-9
 #: How near to zero a parabola has to come, as a share of the smaller slope at the ends, to be looked at.
 _NEAR = 0.5
-#: Values that differ by less than this, relative to 1 + their size, say nothing about slopes.
+#: Values that differ by less than this, relative to 1 + their size, say nothing about slopes; and slopes
+#: below it, by widths of the branch, have no sign: psi of a symmetric orbit is zero to rounding all along.
 _ROUNDING = 1e-11
 
 
@@ -182,6 +183,8 @@ def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
         if _flat_end(slopes[k : k + 4]):
             continue
         steep = max(abs(float(m.ahead[0])) for m in (step.first, step.last))
+        if steep < _ROUNDING * (1.0 + abs(step.last.value)):
+            continue
         parts = search.dipping(step, slopes[k : k + 4])
         inside = (e for part in parts for e in search.extrema(part, _HALVINGS))
         for point, largest, slope in inside:

@@ -23,6 +23,7 @@ from __future__ import annotations
 import random
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import sympy
@@ -37,6 +38,8 @@ from contfric.models.symbols import Formulas
 
 #: The key of a reset.
 CHATTER = "chatter"
+#: Models that are kept with chatter: those of one study, and some more.
+_MODELS = 16
 #: Rounding in an identity of formulas, relative to 1 + the values; and states at which it must hold.
 _SAME, _PLACES = 1e-9, 8
 
@@ -91,13 +94,19 @@ def chatter_parts(
 
 def with_chatter(model: Model) -> Model | None:
     """Return a model with chatter at all of its walls for which that is derived, or None."""
+    if not model.definition or model.composed or model.chatters:
+        return None
+    walls = tuple(r.surface for r in model.resets if r.lands.get(r.surface, 0) != 0)
+    return _with_chatter_at(model.definition, walls)
+
+
+@lru_cache(maxsize=_MODELS)
+def _with_chatter_at(definition: str, walls: tuple[str, ...]) -> Model | None:
+    """Return the model of a definition with chatter at walls: to derive it takes longer than most orbits."""
     from contfric.models.derive import model_from
     from contfric.models.describe import describe, from_text
 
-    if not model.definition or model.composed or model.chatters:
-        return None
-    data = from_text(model.definition).data()
-    walls = [r.surface for r in model.resets if r.lands.get(r.surface, 0) != 0]
+    data = from_text(definition).data()
     for surface in walls:
         asked = {**data["resets"], surface: {**data["resets"][surface], CHATTER: True}}
         with suppress(EntryError):

@@ -74,13 +74,18 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
         Where to draw; new axes by default.
     """
     ax = axes_or_new(ax)
-    label: str | None = curve.label
+    labels = {True: curve.label, False: f"{curve.label} (unstable orbits)"}
     for stable, group in itertools.groupby(range(len(curve)), key=lambda k: bool(curve.stable[k])):
         run = list(group)
         part = curve.values[run[0] : run[-1] + 2]  # to the first point of the next run
         look = STABLE if stable else UNSTABLE
-        ax.plot(*part.T, linestyle=look, color=BLUE, linewidth=LINE_WIDTH, label=label)
-        label = None
+        ax.plot(
+            *part.T,
+            linestyle=look,
+            color=BLUE,
+            linewidth=LINE_WIDTH,
+            label=labels.pop(stable, None),
+        )
     name_axes(ax, parameter_label(curve.parameters[0]), parameter_label(curve.parameters[1]))
     ax.legend(fontsize=sized(SMALL), loc="best")
     return ax

@@ -14,8 +14,12 @@ from contfric.plot.style import GREY, LINE_WIDTH, branch_colours, lighter
 if TYPE_CHECKING:
     from contfric.response.returns import ReleaseMap, Returns
 
-#: Size of a point: a thousand of them are told apart.
-_POINT = 2.0
+#: Size of a point: a thousand of them are told apart; and of one of a few, which would be overlooked.
+_POINT, _FEW_POINT = 2.0, 7.0
+#: So many different points are few: those of a periodic solution.
+_FEW = 64
+#: Points that agree to so many digits lie on each other in any figure.
+_DIGITS = 6
 
 
 def plot_returns(
@@ -43,7 +47,9 @@ def plot_returns(
     x, y = found.pairs(coordinate, step)
     ax = axes_or_new(ax)
     name = coordinate or found.model.states[0]
-    ax.plot(x, y, linestyle="none", marker=".", markersize=_POINT, color="#1F4E79")
+    few = len(np.unique(np.column_stack([x, y]).round(_DIGITS), axis=0)) <= _FEW
+    size = _FEW_POINT if few else _POINT
+    ax.plot(x, y, linestyle="none", marker=".", markersize=size, color="#1F4E79")
     _draw_diagonal(ax, np.concatenate([x, y]))
     name_axes(ax, f"${name}_{{k}}$", f"${name}_{{k+{step}}}$")
     return ax

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from contfric.errors import ParameterError, path_of, whole_number
 from contfric.models.definition import FloatArray
@@ -82,7 +83,6 @@ def animate_orbit(orbit: Orbit, path: str | Path, frames: int = 120, rate: int =
     ParameterError
         If the file is no gif, or its folder does not exist.
     """
-    from matplotlib.animation import FuncAnimation, PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from contfric.plot.orbit import plot_orbit
@@ -95,23 +95,41 @@ def animate_orbit(orbit: Orbit, path: str | Path, frames: int = 120, rate: int =
     frames = whole_number("frames", frames, least=2, most=_MOST_FRAMES)
     rate = whole_number("rate", rate, least=1, most=100)
     fig = new_figure(5.6, 4.2)
+    fig.set_dpi(100)
     ax = plot_orbit(orbit, fig.add_subplot())
     times = float(orbit.cycle[0, 0]) + orbit.period * np.arange(frames) / frames
     at = np.array([_place(orbit, time) for time in times])
     trail = max(1, round(_TAIL * frames))
+    canvas = FigureCanvasAgg(fig)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    still = canvas.copy_from_bbox(fig.bbox)  # type: ignore[no-untyped-call]
     (tail,) = ax.plot([], [], color=BLACK, lw=1.5, alpha=0.5, zorder=6)
     (point,) = ax.plot([], [], "o", color=BLACK, ms=7, zorder=7)
-    FigureCanvasAgg(fig).draw()  # type: ignore[no-untyped-call]
-    fig.set_layout_engine("none")  # laid out once: axes that move with the numbers would jump
 
-    def show(frame: int) -> list[Artist]:
+    def shown(frame: int) -> NDArray[np.uint8]:
+        """Return the pixels of a frame: all but the point and its tail is drawn once."""
         rows = np.arange(frame - trail, frame + 1) % frames
         tail.set_data(*at[rows].T)
         point.set_data(*at[[frame]].T)
-        return [tail, point]
+        canvas.restore_region(still)  # type: ignore[no-untyped-call]
+        for artist in (tail, point):
+            ax.draw_artist(artist)
+        pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        return pixels[..., :3].copy()
 
-    FuncAnimation(fig, show, frames=frames, blit=False).save(path, PillowWriter(fps=rate), dpi=100)
+    _write_gif(map(shown, range(frames)), path, rate)
     return path
+
+
+def _write_gif(frames: Iterator[NDArray[np.uint8]], path: Path, rate: int) -> None:
+    """Write frames, one at a time, as a gif that repeats; its colours are those of the first frame."""
+    from PIL import Image
+
+    first = Image.fromarray(next(frames)).quantize()
+    others = (
+        Image.fromarray(frame).quantize(palette=first, dither=Image.Dither.NONE) for frame in frames
+    )
+    first.save(path, save_all=True, append_images=others, duration=1000 / rate, loop=0)
 
 
 def _place(orbit: Orbit, time: float) -> FloatArray:

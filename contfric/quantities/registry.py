@@ -210,7 +210,8 @@ def _unknown(name: str, model: Model, inside: Inside) -> None:
             f"{', '.join(f'{kind}({name})' for kind in FUNCTIONALS[:5])}"
         )
     known = [*NAMED, *(n for n, _ in model.quantities), *model.parameter_names]
+    state = model.states[0]
     raise ParameterError(
         f"model '{model.name}' has no quantity '{name}'{did_you_mean(name, known)}; or an expression "
-        "such as max(x) - min(x)"
+        f"such as max({state}) - min({state})"
     )

@@ -45,13 +45,27 @@ class Attractors:
         return targets_of(self.model, self.orbits)
 
     def add(self, orbit: Orbit) -> bool:
-        """Add an orbit and its mirror image, if they are not known; whether that is so."""
+        """Add an orbit and its mirror image, if they are not known; whether that is so.
+
+        Its model may have chatter where the given one has not: then the others are told by it, too.
+        """
+        if orbit.model.chatters and not self.model.chatters:
+            self.model = orbit.model
         images = [orbit]
         if self.model.symmetry is not None and not orbit.symmetric:
             images.append(orbit.mirror())
         new = [image for image in images if not self._knows(image)]
         self.orbits += new
         return bool(new)
+
+    def rest_at_walls(self) -> bool:
+        """Take the model with chatter at its walls, as `find_orbit` does; whether there is one."""
+        from contfric.models.chatter import with_chatter  # which takes sympy
+
+        resting = with_chatter(self.model)
+        if resting is not None:
+            self.model = resting
+        return resting is not None
 
     def _knows(self, orbit: Orbit) -> bool:
         mine, theirs = targets_of(self.model, [orbit]), self.targets

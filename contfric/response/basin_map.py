@@ -54,7 +54,6 @@ PHASE = "phase"
 class _BasinJob:
     """Starts to be labelled, one after the other."""
 
-    model: Model
     vector: FloatArray
     time: float
     states: FloatArray
@@ -65,7 +64,7 @@ class _BasinJob:
 
     def tile(self, attractors: Attractors, chosen: IntArray) -> BasinTile:
         targets, states = attractors.targets, self.states[chosen]
-        return BasinTile(self.model, self.vector, targets, self.time, states, self.periods)
+        return BasinTile(attractors.model, self.vector, targets, self.time, states, self.periods)
 
     def foretell(self, count: int, seconds: float) -> None:
         """Say how long all starts will take, by some that took so many seconds."""
@@ -141,7 +140,7 @@ def basins(
     _check_size(model, axes)
     period, periods = model.view(vector).period, ceil(periods * clock_period(model, vector))
     states = _states(model, axes, fixed)
-    job = _BasinJob(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
+    job = _BasinJob(vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)
     for orbit in () if orbits is None else given_orbits(model, vector, orbits):
         attractors.add(orbit)
@@ -158,7 +157,7 @@ def basins(
         if progress is not None:
             progress("interrupted: what is labelled is kept")
     labels, motions = rows.labels.reshape(shape), rows.motions.reshape(shape)
-    return Basins(model, axes, vector, fixed, tuple(attractors.orbits), labels, motions)
+    return Basins(attractors.model, axes, vector, fixed, tuple(attractors.orbits), labels, motions)
 
 
 def _in_order(grid: Any, params: Any) -> tuple[Any, Any]:
@@ -235,9 +234,9 @@ def _record(
 ) -> dict[str, Any]:
     """Describe the computation, so that tiles of another one are not taken for its."""
     return {
-        **versions(job.model),
+        **versions(attractors.model),
         "kind": "basins",
-        "params": job.model.mapping(job.vector),
+        "params": attractors.model.mapping(job.vector),
         "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in axes.items()},
         "states": digest(job.states),
         "orbits": digest(*attractors.targets),
@@ -245,6 +244,11 @@ def _record(
         "limits": [job.periods],
         "tile": job.side,
     }
+
+
+def _chattering(rows: BasinRows) -> IntArray:
+    """Return the starts whose impacts follow each other faster and faster, and that do not go on."""
+    return np.flatnonzero(rows.motions == Motion.CHATTER.code)
 
 
 def _unknown(rows: BasinRows) -> IntArray:
@@ -267,6 +271,8 @@ def _find_by_seeds(job: _BasinJob, attractors: Attractors) -> None:
             began = monotonic()
             rows = compute_basin_tile(job.tile(attractors, left))
             job.foretell(len(left), monotonic() - began)
+            if len(_chattering(rows)) and attractors.rest_at_walls():
+                continue
             left = left[_unknown(rows)]
         left, tries = _search(job, attractors, left, tries)[0], 2 * tries
 
@@ -316,6 +322,9 @@ def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:
 
 def _resolve(job: _BasinJob, attractors: Attractors, rows: BasinRows) -> None:
     """Find the orbits of what is periodic and unknown, until nothing is left that has one."""
+    chattering = _chattering(rows)
+    if len(chattering) and attractors.rest_at_walls():
+        _label(job, attractors, chattering, rows, None)
     left, tries = _unknown(rows), 1
     while len(left):
         left, new = _search(job, attractors, left, tries)

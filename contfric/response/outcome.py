@@ -21,7 +21,9 @@ class Outcome(Coded):
     HELD = "it ends at rest, for ever"
     UNBOUNDED = "it grew with no bound in sight"
     NO_MOTION = "no solution starts there, or its events follow each other at once"
-    CHATTER = "impacts follow each other faster and faster, and it does not go on"
+    CHATTER = (
+        "impacts follow each other faster and faster; it goes on if the reset has chatter: true"
+    )
     QUIET = "it meets no surface any more"
     OUTSIDE = "the model is not defined there"
     MISSING = "not computed: the computation was interrupted"

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean, real_number, shown
+from contfric.models.clocks import TICK
 from contfric.models.definition import Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import MAPPED, tables
@@ -21,11 +22,17 @@ _SENSES = {"either": 0, "rising": 1, "falling": -1}
 
 
 def usual_section(model: Model) -> SectionLike:
-    """Return the section to take where none is named: the stops, or a phase where the model has none.
+    """Return the section to take where none is named: the stops, else a phase, the tick or the first surface.
 
-    A structure has as many velocities that vanish as it has contacts, and no stops.
+    A structure has as many velocities that vanish as it has contacts, and no stops. A model with a clock has
+    no other time, and its tick is what a phase is of others.
     """
-    return STOPS if model.stop_surface or model.autonomous else 0.0
+    if model.stop_surface:
+        return STOPS
+    if not model.autonomous:
+        return 0.0
+    names = [surface.name for surface in model.surfaces]
+    return TICK if TICK in names else names[0] if names else STOPS
 
 
 def section_of(model: Model, section: object, sense: object = "either") -> Cut:
@@ -106,8 +113,8 @@ def _on_surface(model: Model, section: str, sense: int) -> Cut:
         raise ParameterError(
             f"model '{model.name}' has no surface on which it stops: a section is {_choices(model)}"
         )
-    hint = did_you_mean(section, [*surfaces, *model.kinks, STOPS, RELEASES])
-    raise ParameterError(f"no section '{section}'{hint}; a section is {_choices(model)}")
+    valid = f"{did_you_mean(section, _named(model))}{_or_phase(model)}"
+    raise ParameterError(f"no section '{section}'{valid}")
 
 
 def _lies_on(model: Model, mode: str, surface: str) -> bool:
@@ -115,9 +122,16 @@ def _lies_on(model: Model, mode: str, surface: str) -> bool:
 
 
 def _choices(model: Model) -> str:
-    names = [f"'{STOPS}'"] if model.stop_surface else []
-    if any(mode.sliding for mode in model.modes):
-        names.append(f"'{RELEASES}'")
-    names += [f"'{s.name}'" for s in model.surfaces]
-    phase = "" if model.autonomous else ", or a phase of the excitation from 0 to 1"
-    return f"one of {', '.join(names)}{phase}"
+    names = ", ".join(f"'{name}'" for name in _named(model))
+    return f"one of {names}{_or_phase(model)}"
+
+
+def _or_phase(model: Model) -> str:
+    return "" if model.autonomous else ", or a phase of the excitation from 0 to 1"
+
+
+def _named(model: Model) -> list[str]:
+    """Return the sections of a model that have names."""
+    stops = [STOPS] if model.stop_surface else []
+    releases = [RELEASES] if any(mode.sliding for mode in model.modes) else []
+    return [*stops, *releases, *(s.name for s in model.surfaces), *model.kinks]

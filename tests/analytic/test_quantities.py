@@ -379,6 +379,18 @@ def test_extrema_of_a_branch_with_a_fold_are_those_of_fine_steps() -> None:
             assert extremum.orbit.admissible
 
 
+def test_what_is_constant_to_rounding_has_no_extrema() -> None:
+    """psi of symmetric orbits is zero, and its slopes are rounding: each of them was a kink."""
+    branch = cf.continue_orbit(cf.solve_orbit("coulomb", "2s", FIG5), "Omega", (0.45, 0.55))
+    assert np.max(np.abs(branch.quantity("psi"))) < 1e-13
+    assert (
+        branch.extrema("psi")
+        == branch.extrema("mean(x)")
+        == branch.extrema("S0 + max(u) + min(u)")
+        == ()
+    )
+
+
 def test_a_pair_of_extrema_within_one_step_is_found() -> None:
     """x_max less a line in Omega has a minimum and a maximum where its second derivative changes sign."""
     zeta = 0.1

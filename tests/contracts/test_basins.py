@@ -172,6 +172,27 @@ def test_orbits_whose_segments_cross_a_section(model: str) -> None:
     np.testing.assert_allclose(found.orbits[label].state(0.0), at, atol=1e-9)
 
 
+def test_impacts_that_chatter_are_told_by_the_model_that_rests_at_its_wall() -> None:
+    """A reset without `chatter: true`: `find_orbit` finds the orbit with chatter, and basins take it.
+
+    Basins ended with the error that 'table_lift' is not in a list, or had starts that end as chatter.
+    """
+    values = {"a": 1.2, "e": 0.5}
+    grid = {"x": [1.0, 2.0, 5.0], "v": [0.0, 2.0]}
+    found = cf.basins("bouncing-ball", grid, values)
+    for i, x in enumerate(grid["x"]):
+        for j, v in enumerate(grid["v"]):
+            own = cf.find_orbit("bouncing-ball", values, state=[x, v])
+            label = found.orbits[found.labels[i, j]]
+            np.testing.assert_allclose(label.state(0.0), own.state(0.0), atol=1e-9)
+    [rest] = [orbit for orbit in found.orbits if "chatter" in str(orbit.signature)]
+    flight = cf.find_orbit("bouncing-ball", values, state=[5.0, 2.0])  # which chatters nowhere
+    assert found.model.chatters == rest.model.chatters != flight.model.chatters == ()
+    for known in ([flight], [rest]):
+        given = cf.basins("bouncing-ball", grid, values, orbits=known)
+        assert np.all(np.unique(given.labels) == [0, 1])
+
+
 def test_without_excitation() -> None:
     belt = cf.load_model("belt")
     first, second = belt.states[:2]

@@ -191,13 +191,27 @@ def test_overlay() -> None:
 
 
 @pytest.mark.parametrize(
+    ("model", "section"),
+    [("buck", "tick"), ("thermostat", "hot"), ("integrate-and-fire", 0.0), ("impact", "stops")],
+)
+def test_every_model_has_a_section_where_none_is_named(model: str, section: str | float) -> None:
+    """A converter whose clock is a state has no phase and no stops: it was refused."""
+    name, value = next(iter(cf.load_model(model).defaults.items()))
+    swept = cf.sweep(model, name, [value, 1.001 * value], both=False)
+    named = cf.sweep(model, name, [value, 1.001 * value], section=section, both=False)
+    assert swept.section == section
+    assert len(swept.up) > 0
+    np.testing.assert_array_equal(swept.up.states, named.up.states)
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"parameter": "Omga"}, "did you mean 'Omega'"),
         ({"values": [0.5, 0.4]}, "ascending"),
         ({"values": []}, "ascending"),
         ({"direction": "sideways"}, "direction is one of"),
-        ({"section": "F"}, "no section 'F'"),
+        ({"section": "F"}, "no section 'F'.* Valid: stops, releases, F[+], F-, v, or a phase"),
         ({"section": 1.0}, "0 <= phase < 1"),
         ({"section": True}, "a section is"),
         ({"sense": "rising"}, "needs a surface"),

@@ -28,7 +28,10 @@ class PoincareTask(SectionTask):
 
     def does(self, study: Study) -> str:
         """Return the section in words."""
-        return f"points of one solution at {self.section if self.section is not None else 'stops'}"
+        from contfric.response.sections import usual_section
+
+        section = usual_section(study.model) if self.section is None else self.section
+        return f"points of one solution at {section}"
 
     def compute(self, job: Job) -> Returns:
         """Simulate one solution."""
