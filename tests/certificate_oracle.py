@@ -142,6 +142,15 @@ class Truth:
                 return False
         return True
 
+    def repeats(self, z: list[mpf], periods: int) -> bool:
+        """Tell whether a part of the period is one: its first joint comes again after it."""
+        n, sign = len(self.segments), -1 if self.half else 1
+        for q in (q for q in range(2, periods + 1) if periods % q == 0 == n % q):
+            t, x = self.joint(z, n // q)
+            if abs(t - z[0] - self.turn / q) + abs(x - sign * z[1]) < mpf(10) ** -30:
+                return True
+        return False
+
     def advance(self, t: mpf, x: mpf, ends: list[mpf]) -> tuple[mpf, mpf]:
         """Follow the segments from a start, with the ends nearby."""
         for i, (mode, _) in enumerate(self.segments):
@@ -184,7 +193,7 @@ def false_statements(data: dict[str, Any]) -> list[str]:
             z = truth.newton(start)
         except (ValueError, ZeroDivisionError):
             return ["exists"]
-        wrong = []
+        wrong = ["period"] if truth.repeats(z, data["periods"]) else []
         radii = [mpf(r) for r in data["radius"]]
         if any(abs(a - b) > r for a, b, r in zip(z, start, radii, strict=True)):
             wrong.append("exists")
@@ -208,9 +217,11 @@ def _discs(stated: list[dict[str, str]], mu: list[mp.mpc]) -> list[str]:
         # differences of 1e-25 know a multiplier to about 1e-22
         return all(abs(value - c) <= r + mpf(10) ** -18 for (c, r), value in parts)
 
+    if not stated:
+        return []
     orders = (mu, mu[::-1])
     fits = any(all(inside(d, m) for d, m in zip(stated, order, strict=True)) for order in orders)
-    return [] if fits or not stated else ["multipliers"]
+    return [] if fits else ["multipliers"]
 
 
 # ------------------------------------------------------------------------- false certificates
@@ -222,6 +233,8 @@ def mutated(data: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     for _ in range(int(rng.integers(1, 4))):
         change = _CHANGES[int(rng.integers(len(_CHANGES)))]
         change(found, rng)
+        if change in (_ball_for_a_parameter, _no_number):  # others count with its numbers
+            break
     return found
 
 
@@ -287,7 +300,60 @@ def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
         data["periods"] += 1
 
 
+def copied(data: dict[str, Any], count: int) -> dict[str, Any]:
+    """Return a certificate of the same orbit, as one of several times its period (odd for a half)."""
+    found = copy.deepcopy(data)
+    turn = data["periods"] * np.pi * (1 if data["half"] else 2) / data["params"]["Omega"]
+    sides = [-1 if data["half"] and k % 2 else 1 for k in range(count)]
+    mirror = {"slide+": "slide-", "slide-": "slide+", "F+": "F-", "F-": "F+"}
+    found["periods"] *= count
+    found["segments"] = [
+        [mirror.get(c, c) if side < 0 else c for c in row]
+        for side in sides
+        for row in data["segments"]
+    ]
+    found["joints"] = [
+        side * c if i % 2 else c + k * turn
+        for k, side in enumerate(sides)
+        for i, c in enumerate(data["joints"])
+    ]
+    found["radius"] = [max(r, 1e-11) for r in data["radius"]] * count
+    found["enclosure"] = [f"{c!r} +/- 1e-10" for c in found["joints"]]
+    found["multipliers"] = []
+    return found
+
+
+def _copied(data: dict[str, Any], rng: np.random.Generator) -> None:
+    data.update(copied(data, 3 if data["half"] else int(rng.integers(2, 4))))
+
+
+def _ball_for_a_parameter(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """State it for all values of a parameter in a ball."""
+    name = str(rng.choice(list(data["params"])))
+    data["params"][name] = f"{data['params'][name]!r} +/- {10.0 ** rng.uniform(-30, -3)!r}"
+
+
+def _no_number(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Put what is no number, or none that can be meant, in the place of one."""
+    junk = (float("nan"), float("inf"), -float("inf"), 1e308, 5e-324, 0, -1e-10, True, None, "nan")
+    name = str(rng.choice(["joints", "radius", "enclosure", "params"]))
+    where = list(data[name]) if name == "params" else range(len(data[name]))
+    data[name][where[int(rng.integers(len(where)))]] = junk[int(rng.integers(len(junk)))]
+
+
+def _inverted(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """State the other stability, with multipliers that agree: their inverses."""
+    _other_side(data, rng)
+    with mp.workdps(DIGITS):
+        for disc in data["multipliers"]:
+            (re, r), (im, _) = ball(disc["re"]), ball(disc["im"])
+            if re or im:
+                other = 1 / mp.mpc(re, im)
+                disc["re"] = f"{mp.nstr(other.real, 40)} +/- {mp.nstr(r, 5)}"
+                disc["im"] = f"{mp.nstr(other.imag, 40)} +/- {mp.nstr(r, 5)}"
+
+
 _CHANGES = (
     *(_move_joint, _shrink, _move_ball, _move_disc, _other_side, _other_params, _other_segment),
-    *(_turned, _other_turn),
+    *(_turned, _other_turn, _copied, _ball_for_a_parameter, _no_number, _inverted),
 )

@@ -38,6 +38,9 @@ class Certificate(Shown):
         Discs that contain the multipliers of one turn (half of a symmetric orbit), largest first.
     precision : int
         Bits that were needed.
+    kept : int
+        How many numbers the orbit keeps, whatever they are, as contacts never slip: it is unique among those
+        that keep what the printed one does, and the multipliers 1 of the others are not among its own.
     """
 
     orbit: Orbit
@@ -49,6 +52,7 @@ class Certificate(Shown):
     enclosure: list[arb]
     multipliers: list[acb]
     precision: int
+    kept: int = 0
 
     @property
     def proved(self) -> bool:
@@ -111,6 +115,10 @@ class Certificate(Shown):
             f"  admissible   {self.admissible}",
             f"  stable       {self.stable}",
         ]
+        if self.kept:
+            lines.append(
+                f"  family       unique among those that keep {self.kept} numbers as it does"
+            )
         if self.enclosure:
             lines.append(f"  enclosure    joints known to {self.width:.1e}, {self.precision} bits")
         lines += [f"  multiplier   {mu.str(12)} (of one turn)" for mu in self.multipliers]

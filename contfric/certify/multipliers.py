@@ -15,6 +15,8 @@ Appl. 434 (2011)); where they cluster about zero, all lie within ``|P^k|^(1/k)``
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from flint import acb, acb_mat, arb, arb_mat
 
 from contfric.certify.chain import Chain
@@ -25,7 +27,12 @@ from contfric.models.balls.numbers import Vector, column, row_norm
 _SQUARINGS = 6
 
 
-def poincare_map(chain: Chain, joints: list[Vector], known: list[list[Vector]]) -> arb_mat | None:
+def poincare_map(
+    chain: Chain,
+    joints: list[Vector],
+    known: list[list[Vector]],
+    kept: Sequence[Vector] = (),
+) -> arb_mat | None:
     """Return the derivative of a Poincare map, over one turn, at the joint with the most vanishing rows.
 
     None where an exit may be tangential.
@@ -34,6 +41,7 @@ def poincare_map(chain: Chain, joints: list[Vector], known: list[list[Vector]]) 
     ----------
     joints : enclosures of joints 0 .. N
     known : rows that vanish at each joint
+    kept : rows by the states that every disturbance keeps: their multipliers 1 are taken out
     """
     count = chain.segments.count
     at, rows = _most_known(chain, joints, known)
@@ -48,7 +56,8 @@ def poincare_map(chain: Chain, joints: list[Vector], known: list[list[Vector]]) 
     if chain.segments.turn == 0.0:
         m = chain.m
         total = arb_mat([[total[a, b] for b in range(1, m)] for a in range(1, m)])
-    return _restricted(total, rows)
+    timed = chain.segments.turn != 0.0
+    return _restricted(total, [*rows, *([arb(0)] * timed + row for row in kept)])
 
 
 def _most_known(

@@ -3,9 +3,12 @@
 1. Interval Newton (:mod:`contfric.certify.krawczyk`) on the chain of segments, in a box around the printed
    joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.
 2. The same in a thin box around the limit of Newton's method in many digits: the solution is known to
-1e-30. 3. With that, every inequality over every segment, and the multipliers. What is not decided is
-tried again with
-   twice the digits.
+   1e-30.
+3. With that, every inequality over every segment, and the multipliers. What is not decided is tried again
+   with twice the digits.
+
+Where a contact never slips the orbits are a continuum. One of them is proved, alone among those that keep
+the same (:mod:`contfric.certify.kept`).
 
 The stated error of the joints is what rounding of the flow and the residual do to them:
 ``|C| rho`` with C the inverse of the Jacobian and rho the rounding of one equation.
@@ -21,6 +24,7 @@ from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.inequalities import inequalities
+from contfric.certify.kept import Kept, kept_by_chain, with_kept
 from contfric.certify.krawczyk import Inclusion, approximate_inverse, enclosed, krawczyk
 from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
@@ -39,7 +43,7 @@ _WIDE = 5
 _SPARE = 30
 #: Least share of the box that is tried where the Jacobian changes too much over it.
 _SMALLEST = 16
-_FAMILY = "it is one of a family of orbits: what a contact that never slips keeps is free"
+_FAMILY = "it is one of a family of orbits, and it is not known exactly what a contact keeps"
 
 
 def certify_orbit(orbit: Orbit) -> Certificate:
@@ -77,9 +81,11 @@ def provable_form(orbit: Orbit) -> Orbit:
         return orbit if is_symmetry(orbit, segments_of(orbit.system), model) else orbit.as_whole()
 
 
-def equations_of(segments: Segments, model: BallModel, x: Vector) -> tuple[Vector, arb_mat]:
-    """Return residual and Jacobian of a chain, as Newton's method takes them."""
-    residual, rows = Chain(segments, model).linearised(x)
+def equations_of(
+    segments: Segments, model: BallModel, kept: list[Kept], printed: Vector, x: Vector
+) -> tuple[Vector, arb_mat]:
+    """Return residual and Jacobian of a chain that keeps what the printed joints do."""
+    residual, rows = with_kept(*Chain(segments, model).linearised(x), kept, x, printed)
     return residual, arb_mat(rows)
 
 
@@ -95,8 +101,9 @@ def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
 
 def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
     model = ball_model(orbit.model, orbit.params)
-    equations = partial(equations_of, segments, model)
     printed = [arb(float(x)) for x in orbit.joints.ravel()]
+    kept = kept_by_chain(segments, model)
+    equations = partial(equations_of, segments, model, kept, printed)
     inverse = approximate_inverse(equations(printed)[1])
     if inverse is None:
         return _nothing(orbit, _singular(orbit, "at the printed joints"), bits)
@@ -118,7 +125,8 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
         unique = Finding(
             Verdict.UNDECIDED, "the equations are nearly singular over the stated error"
         )
-    return _with_solution(orbit, segments, model, thin, exists, unique, radii, bits)
+    chain = Chain(segments, model)
+    return _with_solution(orbit, chain, kept, thin, exists, unique, radii, bits)
 
 
 def _singular(orbit: Orbit, where: str) -> str:
@@ -127,15 +135,15 @@ def _singular(orbit: Orbit, where: str) -> str:
 
 def _with_solution(
     orbit: Orbit,
-    segments: Segments,
-    model: BallModel,
+    chain: Chain,
+    kept: list[Kept],
     thin: Inclusion,
     exists: Finding,
     unique: Finding,
     radii: Vector,
     bits: int,
 ) -> Certificate:
-    chain = Chain(segments, model)
+    segments, model = chain.segments, chain.model
     joints = chain.joints(thin.zero)
     closing = closing_of(segments, model, orbit.system.half)
     admissible = all_of(
@@ -145,11 +153,14 @@ def _with_solution(
     stable = Finding(Verdict.REFUTED, "the least disturbance ends a hold")
     if not orbit.system.holds:
         stable = Finding(Verdict.UNDECIDED, "a stop may be tangential")
-        matrix = poincare_map(chain, joints, zeros_at_joints(segments, model, closing))
+        known = zeros_at_joints(segments, model, closing)
+        matrix = poincare_map(chain, joints, known, [one.row for one in kept])
         if matrix is not None:
-            discs = turn_multipliers(matrix, orbit.model.directions)
+            discs = turn_multipliers(matrix, orbit.model.directions - len(kept))
             stable = stability(discs)
-    return Certificate(orbit, exists, unique, admissible, stable, radii, thin.zero, discs, bits)
+    return Certificate(
+        orbit, exists, unique, admissible, stable, radii, thin.zero, discs, bits, len(kept)
+    )
 
 
 def _nothing(

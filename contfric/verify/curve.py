@@ -11,11 +11,10 @@ from typing import Any, Self
 
 from flint import arb, arb_mat, arb_series, ctx
 
-from contfric.verify.motion import Refused, Scene, Undecided, ball, part, positive
+from contfric.verify.motion import Refused, Scene, Undecided, ball, part, see
 
 HALF, INSIDE = arb(0.51), arb(0, 0.51)  # of a box, which reaches beyond its ends
-STEEP = 0.02  # a parameter hardly changes by less than this share of another number
-MOST_PIECES, MOST_HALVINGS = 20_000, 90  # of a slide or a stick
+STEEP, MOST_PIECES, MOST_HALVINGS = 0.02, 20_000, 90  # least share of a parameter; of a segment
 MET = {"CS": "1F0", "SS": "1F0", "GS": "1v1", "T": "1F1", "AS": "0F1"}  # slides, meets, in windows
 
 
@@ -48,6 +47,8 @@ class Box:
             self.gap = 1 - size(1 - self.inverse * self.equations(INSIDE)[1])
             reached = self.radii - self.gap * self.radii + off
             if all(margin > 0 for margin in (self.radii - reached).entries()):
+                if self.newton and not radii:  # an orbit
+                    Scene.check_period(*self.orbits(0))
                 return self
             self.radii = size(1.5 * reached + least)
         raise Undecided("one orbit in a box")
@@ -64,9 +65,8 @@ class Box:
     def moving(self) -> tuple[Scene, list[Any]]:
         """Return scene and unknowns of all orbits, as power series in the direction of their curve."""
         rates = self.rates(arb(0), 1) + 2 * INSIDE * self.rates(INSIDE, 2)
-        turned = self.gap.solve(size(self.inverse * rates))
-        off = column(arb(0, r.upper()) for r in turned.entries())
-        return self.orbits(INSIDE, self.along + off)
+        turned = self.gap.solve(size(self.inverse * rates)).entries()
+        return self.orbits(INSIDE, self.along + column(arb(0, r.upper()) for r in turned))
 
     def equations(self, s: arb) -> tuple[arb_mat, arb_mat]:
         """Return F, and the Jacobian of F and b."""
@@ -125,20 +125,19 @@ def check_admissible(scene: Scene, z: list[arb], met: Any = (), short: bool = Fa
         after = scene.segments[(i + 1) % count][0] * (scene.closing if i + 1 == count else 1)
         start = levels[i - 1] * (scene.closing if i == 0 else 1)
         vanishes = short and side != 0 and side == start
-        if not vanishes:
-            positive(tau, f"{what} lasts")
+        see(vanishes or tau, f"{what} lasts")
         if after not in ((0, -direction) if direction else (-side,)) or after * levels[i] > 0:
             raise Refused(f"{what} does not lead on in that direction")
         if direction and after and not levels[i]:  # a stick shows by itself that it may begin
             end, x = scene.joint(z, i + 1)
-            positive(after * (scene.force(end) - x) - scene.s0, f"{what}: it reverses at its end")
+            see(after * (scene.force(end) - x) - scene.s0, f"{what}: it reverses at its end")
         if direction:  # after rest with S0 = S it starts with acceleration 0
             rest = scene.segments[i - 1][0] == 0 and (scene.s0 - scene.s).is_zero()
             _inside((scene, z), i, "v", direction, 1 + rest, True, met)
         for limit, name in () if direction else ((1, "F+"), (-1, "F-")):
             if vanishes and limit == side:  # the load grows on the way
                 rate = scene.observed(z, i, name, tau.union(arb(0)))[1]
-                positive(side * rate, f"{what} is released transversally")
+                see(side * rate, f"{what} is released transversally")
             else:
                 _inside((scene, z), i, name, -limit, limit == start, limit == side, met)
 
@@ -154,14 +153,12 @@ def _inside(orbit: Any, i: int, name: str, sign: int, order: int, ends: bool, me
         off, third = piece - piece.mid(), sign * scene.observed(z, i, name, piece)[3]
         value += (rate + (bend + third * off / 3) * off / 2) * off  # Taylor's
         rate, bend = rate + (bend + third * off / 2) * off, bend + third * off
-        if value < 0:
-            raise Refused(f"false: {what}")
+        see(not value < 0, what)
         starts = level > 0 == index and order > 0 and (rate, bend)[order - 1] > 0
         stops = level > 0 and index == 2**level - 1 and ends and rate < 0
         lowest = touch is not None and piece.overlaps(touch) and bend > 0
         if not (value > 0 or starts or stops or lowest):
-            if level >= MOST_HALVINGS or len(waiting) > MOST_PIECES:
-                raise Undecided(what)
+            see(level < MOST_HALVINGS and len(waiting) <= MOST_PIECES, what, False)
             waiting += [(level + 1, 2 * index), (level + 1, 2 * index + 1)]
 
 
@@ -178,12 +175,11 @@ def met_in(box: Box, a: Box, b: Box, kind: str, spots: list[Any]) -> dict[tuple[
         _, grows, met[i, name] = _met(scene, z, i, name, times)
         time = times[0] if times else Scene.duration(*moving, i)
         rate = part(Scene.observed(*moving, i, name, time)[0], 1)
-        positive(-first * rate, f"what vanishes at a {kind} falls")
+        see(-first * rate, f"what vanishes at a {kind} falls")
         passed = passed or first * last < 0
         if not window:
-            positive(what * grows * (1 if kind == "CS" else -1), f"the load moves as at a {kind}")
-    if not passed:
-        raise Undecided(f"what vanishes at a {kind} changes its sign")
+            see(what * grows * (1 if kind == "CS" else -1), f"the load moves as at a {kind}")
+    see(passed, f"what vanishes at a {kind} changes its sign", False)
     return met if kind != "T" else {}  # which the law allows
 
 
@@ -191,11 +187,10 @@ def _met(scene: Scene, z: Any, i: int, name: str, windows: list[arb]) -> tuple[a
     """Return a load at the end of a slide, or what is stationary once in a window; its rate; and when."""
     time = duration = scene.duration(z, i)
     for window in windows:
-        positive(window.min(duration - window), "it is touched inside")
+        see(window.min(duration - window), "it is touched inside")
         time = window
         for _ in range(4):  # interval Newton's method
             middle, bend = arb(time.mid()), scene.observed(z, i, name, time)[2]
             time = middle - scene.observed(z, i, name, middle)[1] / bend
-            if not window.contains_interior(time):
-                raise Undecided("a surface is touched")
+            see(window.contains_interior(time), "a surface is touched", False)
     return (*scene.observed(z, i, name, time)[:2], time)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from flint import acb, arb, ctx
 
 from contfric.verify.curve import INSIDE, Box, check_admissible, met_in
-from contfric.verify.motion import Refused, Scene, Undecided, ball, positive
+from contfric.verify.motion import Refused, Scene, Undecided, ball, see
 
 BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
 FORMAT, CHECKED_MODELS = 2, ("coulomb",)
@@ -31,6 +31,9 @@ def check_text(text: str) -> Answer:
     try:
         data = json.loads(text)
         parts = data["checkable"] if data["certificate"] == "diagram" else [data]
+        moved = {k for p in parts[1:] for k, v in p["params"].items() if v != parts[0]["params"][k]}
+        moved |= {p["parameter"] for p in parts if "parameter" in p}
+        see(len(moved) < 2, "its parts are of one diagram")
         stated, bits = zip(*map(_check, parts), strict=True)
         counts = [f"{sum(p['certificate'] == name for p in parts)} {name}s" for name in CHECKS]
         counts += [f"{sum(p.get('ends', []).count(None) for p in parts)} open ends"]
@@ -70,8 +73,7 @@ def orbits_at(data: Any, known: Any = ()) -> list[Box]:
 def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], arb]:
     """Return the events on the one curve of admissible orbits from a to b, or to an end; the parameter."""
     box = Box(data, a.middle.entries(), b.middle.entries()).proved()
-    if not (box.holds(a) and box.holds(b)):
-        raise Undecided("one curve from knot to knot")
+    see(box.holds(a) and box.holds(b), "one curve from knot to knot", False)
     met, (scene, z) = met_in(box, a, b, *end) if end else {}, box.orbits(INSIDE)
     check_admissible(scene, z, met, bool(end) and end[0] == "CS")
     return box.events(a, b) + ([end[0]] if end else []), scene.value
@@ -88,40 +90,36 @@ def _check_tube(data: Any) -> list[str]:
             check_admissible(*first.orbits(0))
         found += [[k, kind] for kind in events_between(data, first, last, end)[0]]
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
-    if sorted(found) != sorted(stated + data["events"]):
-        raise Refused(f"false: its events are {found}")
+    see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
     return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"]
 
 
 def _check_event(data: Any) -> list[str]:
     kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
     found, where = events_between(data, a, b, None if at is None else (kind, [at]))
-    if found != [kind]:
-        raise Refused(f"false: its events are {found}")
-    positive(value.rad() - abs(where - value.mid()), "it happens within the ball")
+    see(found == [kind], f"it has those events, not {found}")
+    see(value.rad() - abs(where - value.mid()), "it happens within the ball")
     return ["exists", f"is a {kind} in {data['parameter']}", "admissible"]
 
 
 def _check_orbit(data: Any) -> list[str]:
     data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"]
-    if "exists" not in claims or not set(claims) <= set(CLAIMS):
-        raise Refused("its statements are not those of an orbit")
+    see({"exists"} <= set(claims) <= set(CLAIMS), "its statements are those of an orbit")
     printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
     scene, z = Box(data, [*printed, ball(s)]).proved().orbits(0)
     for value, near, r in zip(z, printed, radius, strict=True):
-        positive(r - abs(value - near), "it lies in the box around the printed joints")
+        see(r - abs(value - near), "it lies in the box around the printed joints")
     times = [value if k % 2 else value / scene.omega for k, value in enumerate(z)]
-    if not all(ball(v).contains(w) for v, w in zip(data["enclosure"], times, strict=True)):
-        raise Undecided("balls hold the joints")
+    held = (ball(v).contains(w) for v, w in zip(data["enclosure"], times, strict=True))
+    see(all(held), "balls hold the joints", False)
     if "unique" in claims:
         Box(data, [*printed, ball(s)]).proved([*radius, arb(0)])
     if "admissible" in claims:
         check_admissible(scene, z)
     trace, det, jury = scene.multipliers(z)
     for margin in jury if "stable" in claims else ():
-        positive(margin, "the multipliers lie inside of the circle")
-    if "unstable" in claims:
-        positive(-min(jury, key=float), "a multiplier lies outside of the circle")
+        see(margin, "the multipliers lie inside of the circle")
+    see("unstable" not in claims or -min(jury, key=float), "a multiplier is outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
     for disc, mu in zip(data["multipliers"], found, strict=bool(data["multipliers"])):

@@ -34,10 +34,10 @@ def ball(value: Any) -> arb:
     return arb(value)
 
 
-def positive(value: arb, what: str) -> None:
-    """Go on if all numbers of a ball are above 0; refuse if none is."""
-    if not value > 0:
-        raise Refused(f"false: {what}") if value <= 0 else Undecided(what)
+def see(so: Any, what: str, sure: bool = True) -> None:
+    """Go on if something is so, or all numbers of a ball are above 0; refuse if that surely is not."""
+    if not so > 0:
+        raise Refused(f"false: {what}") if sure and so <= 0 else Undecided(what)
 
 
 def part(value: Any, k: int) -> Any:
@@ -61,8 +61,9 @@ class Scene:
     """The parameters and segments of a file, and their solution; joints are (phase of the excitation, x)."""
 
     def __init__(self, data: dict[str, Any], value: Any) -> None:
-        periods, self.half = data["periods"], data["half"]
+        self.periods, self.half = periods, _ = data["periods"], data["half"]
         possible = type(periods) is int and self.half in (False, periods % 2 == 1) and periods > 0
+        possible = possible and str not in map(type, data["params"].values())  # they are no balls
         if not possible or {*data["params"], data["parameter"]} != set(PARAMETERS):
             raise Refused("its parameters, periods and symmetry are not those of a periodic orbit")
         p = {name: ball(given) for name, given in data["params"].items()}
@@ -119,9 +120,15 @@ class Scene:
 
     def joint(self, z: list[Any], i: int) -> tuple[Any, Any]:
         """Return joint i, the last one by periodicity or symmetry."""
-        return (
-            (z[2 * i], z[2 * i + 1]) if i < self.count else (z[0] + self.turn, self.closing * z[1])
-        )
+        after = z[0] + self.turn, self.closing * z[1]
+        return (z[2 * i], z[2 * i + 1]) if i < self.count else after
+
+    def check_period(self, z: list[Any]) -> None:
+        """See that no part of the period is one: the first joint does not come again after it."""
+        for q in (q for q in range(2, self.count + 1) if self.periods % q == 0 == self.count % q):
+            (start, x), (phase, y) = self.joint(z, 0), self.joint(z, self.count // q)
+            off = abs(phase - start - self.turn / q) + abs(y - self.closing * x)
+            see(off, f"1/{q} of its period is not one")
 
     def duration(self, z: list[Any], i: int) -> Any:
         """Return how long segment i lasts."""

@@ -24,7 +24,7 @@ from contfric.cli import main
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 from contfric.verify.file import check_text
-from tests.certificate_oracle import false_statements, mutated
+from tests.certificate_oracle import copied, false_statements, mutated
 
 CHECKER = Path(cf.__file__).parent / "verify"
 SCENES: list[tuple[str, dict[str, float]]] = [
@@ -74,6 +74,45 @@ def test_no_false_certificate_is_verified(index: int) -> None:
         else:
             refused += 1
     assert refused > 12
+
+
+@pytest.mark.parametrize("index", range(len(SCENES)))
+@pytest.mark.parametrize("count", [3, 5])
+def test_several_turns_of_an_orbit_are_none_of_a_longer_period(index: int, count: int) -> None:
+    """All but the period is so: the copies solve the equations, are alone and obey the law."""
+    data = copied(json.loads(certificate(index)), count)
+    answer = check_text(json.dumps(data))
+    assert not answer.yes
+    assert f"1/{count} of its period" in answer.why
+
+
+@pytest.mark.slow
+def test_brute_force_knows_several_turns_of_an_orbit() -> None:
+    assert "period" in false_statements(copied(json.loads(certificate(0)), 2))
+    assert "period" in false_statements(copied(json.loads(certificate(3)), 3))
+
+
+@pytest.mark.parametrize("name", ["Omega", "S", "S0", "h", "zeta"])
+def test_nothing_is_stated_for_a_ball_of_parameters(name: str) -> None:
+    """Only the middle of one for S was looked at."""
+    data = json.loads(certificate(0))
+    data["statements"], data["multipliers"] = ["exists"], []
+    data["enclosure"] = [f"{c!r} +/- 1e-9" for c in data["joints"]]
+    assert check_text(json.dumps(data)).yes
+    data["params"][name] = f"{data['params'][name]!r} +/- 1e-12"
+    assert not check_text(json.dumps(data)).yes
+
+
+def test_one_file_is_of_one_diagram() -> None:
+    """Orbits that differ in one parameter may lie on one; each is proved by itself."""
+    parts = [json.loads(certificate(0))]
+    for change in ({"Omega": 0.501}, {"S": 0.321}):
+        found = cf.solve_orbit("coulomb", "1a", SCENES[0][1] | change)
+        parts.append(certificate_data(found.certify()))
+    assert all(check_text(json.dumps(part)).yes for part in parts)
+    for kept, yes in ((parts[:2], True), (parts[::2], True), (parts, False)):
+        text = json.dumps({"certificate": "diagram", "format": 1, "checkable": kept})
+        assert check_text(text).yes == yes
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import time
 from collections.abc import Callable
 from functools import cache
@@ -22,9 +23,9 @@ PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}
 
 
 @cache
-def tube(name: str, omega: float, low: float, high: float) -> str:
+def tube(name: str, omega: float, low: float, high: float, S: float = 0.32) -> str:
     """Return the only tube of a branch of Fig. 5 as a text."""
-    orbit = cf.solve_orbit("coulomb", name, {**PARAMS, "Omega": omega})
+    orbit = cf.solve_orbit("coulomb", name, {**PARAMS, "Omega": omega, "S": S})
     (found,) = tubes_of(certify_branch(cf.continue_orbit(orbit, "Omega", (low, high))))
     return json.dumps(found)
 
@@ -128,6 +129,28 @@ def _fold_elsewhere(data: dict[str, Any]) -> None:
     data["events"][0][0] += 3
 
 
+def _two_turns(data: dict[str, Any]) -> None:
+    """Each orbit twice, as one of two periods."""
+    data["periods"], data["segments"] = 2, 2 * data["segments"]
+    for k, (*joints, value) in enumerate(data["knots"]):
+        turn = 2 * math.pi / value
+        later = [c + turn if i % 2 == 0 else c for i, c in enumerate(joints)]
+        data["knots"][k] = [*joints, *later, value]
+
+
+def _gap(data: dict[str, Any]) -> None:
+    """Leave boxes in the middle out, where there is no event."""
+    first = data["events"][0][0] // 3
+    del data["knots"][first + 1 : 2 * first]
+    data["events"][0][0] -= first - 1
+
+
+def _from_another_parameter(data: dict[str, Any]) -> None:
+    """The second half of the knots is of another value of S."""
+    other = json.loads(tube("1a", 0.54, 0.53, 0.6, S=0.321))["knots"]
+    data["knots"][: len(data["knots"]) // 2] = other[: len(other) // 2]
+
+
 WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "no fold": _set("events", []),
     "a fold in another box": _fold_elsewhere,
@@ -154,6 +177,12 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "rotated segments": _rotate_segments,
     "one knot": lambda data: data.__setitem__("knots", data["knots"][:1]),
     "the same knot twice": lambda data: data["knots"].insert(5, data["knots"][5]),
+    "two turns": _two_turns,
+    "a gap": _gap,
+    "a ball for S": _param("S", "0.32 +/- 1e-6"),  # type: ignore[arg-type]
+    "NaN for h": _param("h", math.nan),
+    "an infinite knot": lambda data: data["knots"][3].__setitem__(1, math.inf),
+    "knots of other parameters": _from_another_parameter,
     "no numbers": lambda data: data["knots"][3].__setitem__(0, "1"),
 }
 

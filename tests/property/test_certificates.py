@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,21 +109,45 @@ def test_a_continuum_is_undecided() -> None:
     assert Verdict.UNDECIDED in {found.exists.verdict, found.unique.verdict, found.stable.verdict}
 
 
-def test_an_orbit_with_a_contact_that_never_slips_is_said_to_be_one_of_a_family() -> None:
-    spring = {"kind": "jenkins", "displacement": "q1", "stiffness": "1.5", "limit": "5.0"}
+@pytest.mark.parametrize("seed", range(4))
+def test_orbits_with_contacts_that_never_slip_are_proved_among_those_that_keep_the_same(
+    seed: int,
+) -> None:
+    """Multipliers are those of the engine, which has taken the trivial ones out in another way."""
+    rng = np.random.default_rng(seed)
+    limits, stuck = (("0.05", "5.0"), ("5.0", "5.0"))[seed % 2], 1 + seed % 2
+    contacts = {
+        name: {
+            "kind": "jenkins",
+            "displacement": f"q{k + 1}",
+            "stiffness": f"{rng.uniform(0.5, 2)!r}",
+            "limit": limit,
+        }
+        for k, (name, limit) in enumerate(zip("ab", limits, strict=True))
+    }
     model = cf.Mechanism(
-        np.eye(2),
+        np.diag(rng.uniform(0.7, 1.3, 2)),
         0.2 * np.eye(2),
         np.array([[2.0, -1.0], [-1.0, 2.0]]),
-        contacts={"a": spring},
+        contacts=contacts,
         force={"q1": "F*cos(W*t)"},
         parameters={"W": 0.8, "F": 0.3},
         period="2*pi/W",
-        name="never-slips",
+        name=f"never-slips-{seed}",
     )
-    found = cf.find_orbit(model, {"F": 0.3}).certify()
-    assert not found.proved
-    assert "one of a family" in found.why
+    orbit = cf.find_orbit(model)
+    found = orbit.certify()
+    assert found.proved, found.why
+    assert found.kept == stuck
+    assert len(found.multipliers) == len(orbit.joints[0]) - 1 - stuck
+    power = 2 if found.orbit.system.half else 1
+    own = sorted(orbit.multipliers, key=abs)[stuck:]
+    for mu in found.multipliers:
+        there = complex(mu.real, mu.imag) ** power
+        assert min(abs(there - other) for other in own) < 1e-7
+    joints = orbit.joints.copy()
+    joints[0, 2] += 1e-3
+    assert not replace(orbit, joints=joints).certify().proved
 
 
 # ---------------------------------------------------------------------------------- signs
