@@ -19,7 +19,7 @@ from contfric.atlas.matching import identity
 from contfric.atlas.plane import Family, Region
 from contfric.base.interrupts import held_back
 from contfric.curves.curve import Curve
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Itinerary
 from contfric.remember.journal import remembered
@@ -51,7 +51,7 @@ class Living:
 def regions_of(
     model: Model,
     vector: FloatArray,
-    box: Box,
+    box: PlaneRanges,
     curves: Sequence[Curve],
     sections: Sequence[Diagram],
     max_periods: int,
@@ -103,7 +103,7 @@ def _short(section: Diagram, max_periods: int) -> Diagram:
     return replace(section, branches=kept)
 
 
-def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def cells_of(box: PlaneRanges, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the cells that a curve passes, without gaps, each once."""
     found = []
     for part in curve.parts:
@@ -116,7 +116,7 @@ def cells_of(box: Box, curve: Curve) -> tuple[NDArray[np.int64], NDArray[np.int6
     return cells[:, 0], cells[:, 1]
 
 
-def _allowed(model: Model, vector: FloatArray, box: Box) -> NDArray[np.bool_]:
+def _allowed(model: Model, vector: FloatArray, box: PlaneRanges) -> NDArray[np.bool_]:
     """Return the cells whose middles obey the model's constraints."""
     params = dict(model.mapping(vector))
     middle = (np.arange(CELLS) + 0.5) / CELLS
@@ -131,7 +131,7 @@ def _allowed(model: Model, vector: FloatArray, box: Box) -> NDArray[np.bool_]:
     return inside
 
 
-def _centre(box: Box, i: int, j: int) -> dict[str, float]:
+def _centre(box: PlaneRanges, i: int, j: int) -> dict[str, float]:
     at = box.low + (np.array([i, j]) + 0.5) / CELLS * box.widths
     return {name: float(value) for name, value in zip(box.names, at, strict=True)}
 
@@ -148,7 +148,7 @@ def _bounds(
 
 
 def _families(
-    box: Box,
+    box: PlaneRanges,
     sections: Sequence[Diagram],
     cells: NDArray[np.int64],
     depth: FloatArray,
@@ -182,7 +182,7 @@ def _named(orbits: set[Living], names: dict[tuple[Itinerary, bool], str]) -> tup
 
 
 def _along(
-    box: Box, section: Diagram, cells: NDArray[np.int64], depth: FloatArray
+    box: PlaneRanges, section: Diagram, cells: NDArray[np.int64], depth: FloatArray
 ) -> list[tuple[int, set[Living]]]:
     """Return the stretches of a section in regions, each with the orbits on it."""
     varies = box.names.index(section.parameter)
@@ -203,7 +203,7 @@ def _along(
     return stretches
 
 
-def _living(box: Box, section: Diagram, varies: int, cell: int) -> set[Living]:
+def _living(box: PlaneRanges, section: Diagram, varies: int, cell: int) -> set[Living]:
     """Return the orbits at the middle of a cell of a section: of the branches that pass its value."""
     value = box.low[varies] + (cell + 0.5) / CELLS * box.widths[varies]
     found = set()

@@ -14,14 +14,14 @@ from contfric.atlas.seeds import Seeds
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.errors import ContfricError, ParameterError, mapping_of, real_number, shown
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 
 
 def sections_of(
-    orbit: Orbit, box: Box, sections: Mapping[str, Sequence[float]] | None
+    orbit: Orbit, box: PlaneRanges, sections: Mapping[str, Sequence[float]] | None
 ) -> list[tuple[str, float]]:
     """Return the sections as (parameter that is fixed, value)."""
     if sections is None:

@@ -10,7 +10,7 @@ from contfric.atlas.diagram import Diagram
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
 from contfric.curves.problem import Problem
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.curves.side import CurveSide
 from contfric.curves.special import SpecialPoint
 from contfric.models.definition import FloatArray
@@ -22,7 +22,7 @@ Progress = Callable[[str], None]
 class PlaneExploration:
     """State of one exploration of a plane."""
 
-    box: Box
+    box: PlaneRanges
     vector: FloatArray
     kinds: frozenset[Kind]
     max_periods: int

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Truth = Annotated[bool, BeforeValidator(as_truth)]
 
 
-class Part(BaseModel):
+class SchemaPart(BaseModel):
     """A mapping of a YAML file: no other keys than its own, and no types but these.
 
     The description of a field is what its value must be: messages say "'key' must be {description}".
@@ -59,7 +59,7 @@ def keys_of(schema: type[BaseModel]) -> str:
 
     Examples
     --------
-    >>> class Range(Part):
+    >>> class Range(SchemaPart):
     ...     low: float
     ...     high: float = 1.0
     >>> keys_of(Range)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from contfric.censuses.itineraries import is_stop, letters_of, modes_after
 from contfric.censuses.sections import (
     Section,
-    Sweep,
+    SectionSweep,
     dimension_of,
     joint_indices,
     period_of,
@@ -200,7 +200,7 @@ class Grid:
             done = sweep_from(self.section, self.vector, phases, positions, followed, self.events)
             self._keep(phases, done)
 
-    def _keep(self, phases: FloatArray, done: Sweep) -> None:
+    def _keep(self, phases: FloatArray, done: SectionSweep) -> None:
         code = self._codes(done)
         lift = np.where(code >= 0, done.clocks, np.inf)
         self._note_walks(code)
@@ -221,7 +221,7 @@ class Grid:
             larger[: len(old)] = old
             setattr(self, name, larger)
 
-    def _codes(self, done: Sweep) -> IntArray:
+    def _codes(self, done: SectionSweep) -> IntArray:
         """Return the letters of the events within the limits, -1 after them."""
         stop, here = self._letters
         count, events = done.joints.shape[:2]

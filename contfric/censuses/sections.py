@@ -136,7 +136,7 @@ def period_of(model: Model, vector: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class Sweep:
+class SectionSweep:
     """Trajectories from one section.
 
     Attributes
@@ -163,7 +163,7 @@ def sweep_from(
     positions: FloatArray,
     periods: float,
     events: int,
-) -> Sweep:
+) -> SectionSweep:
     """Follow trajectories from a section.
 
     Parameters
@@ -201,7 +201,7 @@ def sweep_from(
         outcome,
     )
     lifts = cycles + clocks / period - phases[:, None]
-    return Sweep(starts, joints, lifts, states, outcome)
+    return SectionSweep(starts, joints, lifts, states, outcome)
 
 
 def arcs_of(section: Section, vector: FloatArray) -> Arcs:

@@ -12,7 +12,7 @@ from flint import arb, arb_mat
 
 
 @dataclass(frozen=True, eq=False)
-class Affine:
+class AffineMatrix:
     """A matrix that is known up to second order in s.
 
     Attributes
@@ -28,7 +28,7 @@ class Affine:
     rest: arb_mat
     half: arb
 
-    def __mul__(self, other: Affine) -> Affine:
+    def __mul__(self, other: AffineMatrix) -> AffineMatrix:
         """Return the matrix product."""
         slope = self.slope * other.at + self.at * other.slope
         linear = self.slope * self.half
@@ -37,17 +37,17 @@ class Affine:
             + linear * (other.slope * self.half)
             + (self.at + linear) * other.rest
         )
-        return Affine(self.at * other.at, slope, rest, self.half)
+        return AffineMatrix(self.at * other.at, slope, rest, self.half)
 
-    def __add__(self, other: Affine) -> Affine:
+    def __add__(self, other: AffineMatrix) -> AffineMatrix:
         """Return the sum."""
-        return Affine(
+        return AffineMatrix(
             self.at + other.at, self.slope + other.slope, self.rest + other.rest, self.half
         )
 
-    def __sub__(self, other: Affine) -> Affine:
+    def __sub__(self, other: AffineMatrix) -> AffineMatrix:
         """Return the difference."""
-        return Affine(
+        return AffineMatrix(
             self.at - other.at, self.slope - other.slope, self.rest - other.rest, self.half
         )
 
@@ -61,7 +61,7 @@ class Affine:
         return self.at + self.slope * self.half + self.rest
 
 
-def enclosing(at: arb_mat, slope: arb_mat, change: arb_mat, half: arb) -> Affine:
+def enclosing(at: arb_mat, slope: arb_mat, change: arb_mat, half: arb) -> AffineMatrix:
     """Return a function of s from its value at 0, and an enclosure of its derivative for all s.
 
     Parameters
@@ -70,4 +70,4 @@ def enclosing(at: arb_mat, slope: arb_mat, change: arb_mat, half: arb) -> Affine
     change : encloses the derivative for all s; balls of what does not depend on s may be added to the rest
     """
     slope = slope.mid()
-    return Affine(at, slope, (change - slope) * half, half)
+    return AffineMatrix(at, slope, (change - slope) * half, half)

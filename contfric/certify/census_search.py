@@ -10,7 +10,7 @@ from flint import arb
 
 from contfric.certify.census_result import CensusCertificate, ProvedOrbit, Strip
 from contfric.certify.following import Follower, Returned
-from contfric.certify.stretch import Line, UndecidedError
+from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
 from contfric.models.definition import FloatArray, Model
@@ -117,7 +117,7 @@ class _Search:
     def _decided(self, first: float, last: float, period: float) -> str:
         """Decide what is released in an interval of phases; return why not, empty if it is decided."""
         middle, half = (arb(first) + arb(last)) / 2, (arb(last) - arb(first)) / 2
-        phase = Line(middle, half, arb(0))
+        phase = LineInS(middle, half, arb(0))
         if self.follower.force_rate(phase.whole) > 0:
             return ""
         try:
@@ -151,7 +151,7 @@ class _Search:
 
     def _at(self, t: arb, like: Returned) -> list[Returned]:
         """Return the releases after that in a narrow ball of phases, up to that with the same itinerary."""
-        returns = self.follower.follow(Line(arb(t.mid()), arb(t.rad()), arb(0)), splits=False)
+        returns = self.follower.follow(LineInS(arb(t.mid()), arb(t.rad()), arb(0)), splits=False)
         at = [k for k, r in enumerate(returns) if r.itinerary == like.itinerary]
         if not at:
             raise UndecidedError("the segments differ")

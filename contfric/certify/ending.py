@@ -18,14 +18,14 @@ from dataclasses import dataclass, replace
 from flint import arb
 
 from contfric.certify.chain import Chain, Segments
-from contfric.certify.extended import Builder, Condition, rows_of
+from contfric.certify.extended import Builder, EventCondition, rows_of
 from contfric.certify.inequalities import (
     DURATION,
     EXIT,
     INSIDE,
     JOINT,
     Inequality,
-    Name,
+    InequalityName,
     inequalities,
 )
 from contfric.certify.passing import dot
@@ -55,7 +55,7 @@ class Edge:
     forward: bool
 
 
-def ends_inside(edge: Edge, box: Box) -> tuple[Name, ...]:
+def ends_inside(edge: Edge, box: Box) -> tuple[InequalityName, ...]:
     """Return the inequalities that end the branch at one orbit of a box; none if that is not proved."""
     if box.tangent is None:
         return ()
@@ -76,7 +76,9 @@ def ends_inside(edge: Edge, box: Box) -> tuple[Name, ...]:
     return ()
 
 
-def _failing(edge: Edge, x: Vector, loose: tuple[Name, ...] | list[Name]) -> list[Inequality]:
+def _failing(
+    edge: Edge, x: Vector, loose: tuple[InequalityName, ...] | list[InequalityName]
+) -> list[Inequality]:
     """Return the inequalities that are not proved for all solutions in some balls."""
     chain = Chain(edge.segments, replace(edge.build(x[-1]), slopes=None))
     joints = chain.joints(x[:-1])
@@ -84,7 +86,7 @@ def _failing(edge: Edge, x: Vector, loose: tuple[Name, ...] | list[Name]) -> lis
     return [inequality for inequality in found if not inequality.finding.proved]
 
 
-def _falls(edge: Edge, box: Box, name: Name, window: arb | None) -> bool:
+def _falls(edge: Edge, box: Box, name: InequalityName, window: arb | None) -> bool:
     """Tell whether the number of an inequality falls towards the outer end, over the whole box."""
     chain = Chain(edge.segments, edge.build(box.all[-1]))
     assert box.tangent is not None
@@ -96,18 +98,18 @@ def _falls(edge: Edge, box: Box, name: Name, window: arb | None) -> bool:
     elif name.what == INSIDE:
         if window is None or sign is None or not window < chain.duration(i, z):
             return False
-        rows = rows_of(chain.model, edge.segments, Condition(i, name.surface), 0)
+        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), 0)
         slope = sign * dot(chain.observed_within(z, i, window, *rows)[1], box.tangent)
     else:
         if sign is None:
             return False
         order = int(name.what == EXIT)
-        rows = rows_of(chain.model, edge.segments, Condition(i, name.surface), order)
+        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
         slope = sign * dot(chain.observed(z, i + 1, *rows)[1], box.tangent)
     return bool(slope < 0 if edge.forward else slope > 0)
 
 
-def signs_of(system: System, name: Name) -> int | None:
+def signs_of(system: System, name: InequalityName) -> int | None:
     """Return the sign with which the observable of an inequality is positive where it holds."""
     layout, surfaces = system.layout, [s.name for s in system.model.surfaces]
     i = name.segment

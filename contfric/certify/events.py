@@ -27,7 +27,7 @@ from contfric.certify.extended import (
 )
 from contfric.certify.inequalities import Touch, inequalities
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
-from contfric.certify.locating import Location, NotLocatedError, location_of
+from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.touching import resting_domain
@@ -64,7 +64,7 @@ class EventCertificate(Shown):
         The event is of its kind.
     admissible : Finding
         The orbit obeys every other inequality over the whole of every segment.
-    location : Location or None
+    location : EventPlace or None
         Its orbit on the shortest problem, and what vanishes there.
     zero : tuple of arb
         The zero of the extended system: joints, what the event needs next to them, the parameter.
@@ -77,7 +77,7 @@ class EventCertificate(Shown):
     simple: Finding
     kind: Finding
     admissible: Finding
-    location: Location | None = None
+    location: EventPlace | None = None
     zero: tuple[arb, ...] = ()
 
     @property
@@ -171,7 +171,9 @@ def _undecided(event: Bifurcation, parameter: str, why: str) -> EventCertificate
     return EventCertificate(event, parameter, None, finding, finding, finding, finding)
 
 
-def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) -> EventCertificate:
+def _attempt(
+    event: Bifurcation, location: EventPlace, parameter: str, bits: int
+) -> EventCertificate:
     orbit = location.orbit
     segments = segments_of(orbit.system)
     params = dict(event.params)
@@ -207,7 +209,7 @@ def _attempt(event: Bifurcation, location: Location, parameter: str, bits: int) 
 
 
 def _extended(
-    event: Bifurcation, location: Location, segments: Segments, build: Builder
+    event: Bifurcation, location: EventPlace, segments: Segments, build: Builder
 ) -> tuple[Equations, Vector]:
     """Return the extended system of an event, and where to start but for the parameter."""
     joints = [arb(float(x)) for x in location.orbit.joints.ravel()]
@@ -229,7 +231,7 @@ def _resonates(c: arb, s: arb) -> bool:
     return bool(s.contains(0) or c.contains(0) or (2 * c + 1).contains(0))
 
 
-def _touch(location: Location, inclusion: Inclusion) -> Touch | None:
+def _touch(location: EventPlace, inclusion: Inclusion) -> Touch | None:
     if location.condition is None:
         return None
     return Touch(location.condition, inclusion.zero[-2] if location.condition.within else None)
@@ -278,7 +280,7 @@ def _second(chain: Chain, z: Vector, touch: Touch) -> arb:
 
 
 def _of_kind(
-    event: Bifurcation, location: Location, chain: Chain, z: Vector, touch: Touch | None
+    event: Bifurcation, location: EventPlace, chain: Chain, z: Vector, touch: Touch | None
 ) -> Finding:
     """Find whether the event is of its kind: at a stop on the limit of rest, by the rate of the load."""
     if touch is None or event.kind is Kind.T:

@@ -36,7 +36,7 @@ Builder = Callable[[arb], BallModel]
 
 
 @dataclass(frozen=True)
-class Condition:
+class EventCondition:
     """What vanishes at an event in addition to the chain.
 
     Attributes
@@ -57,7 +57,7 @@ class Condition:
 
 
 def rows_of(
-    model: BallModel, segments: Segments, condition: Condition, order: int
+    model: BallModel, segments: Segments, condition: EventCondition, order: int
 ) -> tuple[arb_mat, arb_mat]:
     """Return the row of a condition's observable or of its derivative, and its slope by the parameter."""
     assert model.slopes is not None
@@ -69,7 +69,7 @@ def rows_of(
     return row, slope
 
 
-def at_joint(segments: Segments, build: Builder, condition: Condition) -> Equations:
+def at_joint(segments: Segments, build: Builder, condition: EventCondition) -> Equations:
     """Return the equations for the unknowns (z, p) of an event at a joint."""
 
     def equations(x: Vector) -> tuple[Vector, arb_mat]:
@@ -84,7 +84,7 @@ def at_joint(segments: Segments, build: Builder, condition: Condition) -> Equati
     return equations
 
 
-def touched_within(segments: Segments, build: Builder, condition: Condition) -> Equations:
+def touched_within(segments: Segments, build: Builder, condition: EventCondition) -> Equations:
     """Return the equations for the unknowns (z, tau, p) of a touch inside of a segment."""
 
     def equations(x: Vector) -> tuple[Vector, arb_mat]:

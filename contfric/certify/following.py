@@ -28,10 +28,10 @@ from functools import cached_property
 import numpy as np
 from flint import arb, arb_mat
 
-from contfric.certify.affine import Affine
+from contfric.certify.affine import AffineMatrix
 from contfric.certify.first_times import FirstTimes, first_times
 from contfric.certify.sign import Path, positive
-from contfric.certify.stretch import HALF, Line, UndecidedError, ended, released, with_zero
+from contfric.certify.stretch import HALF, LineInS, UndecidedError, ended, released, with_zero
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import column
 from contfric.models.definition import FloatArray
@@ -51,7 +51,7 @@ _SLIDES = {1: "slide+", -1: "slide-"}
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class SolutionSet:
     """A set of solutions at the start of a segment.
 
     Attributes
@@ -67,8 +67,8 @@ class Stretch:
     """
 
     mode: str
-    time: Line
-    state: Affine
+    time: LineInS
+    state: AffineMatrix
     change: tuple[arb, arb]
     itinerary: Itinerary = ()
     joints: tuple[tuple[float, float], ...] = ()
@@ -86,12 +86,12 @@ class Returned:
     time : when it is
     apart : how much later than a period after the first one
     slope : derivative of its time by the phase of the first release; a ball over the interval
-    itinerary, joints, smooth : see :class:`Stretch`
+    itinerary, joints, smooth : see :class:`SolutionSet`
     """
 
     surface: str
-    time: Line
-    apart: Line
+    time: LineInS
+    apart: LineInS
     slope: arb
     itinerary: Itinerary
     joints: tuple[tuple[float, float], ...]
@@ -130,7 +130,7 @@ class Follower:
             found[mode] = np.array(powers)
         return found
 
-    def follow(self, phase: Line, splits: bool) -> list[Returned]:
+    def follow(self, phase: LineInS, splits: bool) -> list[Returned]:
         """Return the releases that may follow a set of releases on F+ within a period.
 
         Parameters
@@ -145,14 +145,14 @@ class Follower:
         """
         state = with_zero(released(self.balls, ("F+", "v"), phase), _V)
         shift = self.force_rate(phase.whole)
-        start = Stretch("slide-", phase, state, (arb(1), shift), begins=self._released)
+        start = SolutionSet("slide-", phase, state, (arb(1), shift), begins=self._released)
         found: list[Returned] = []
         waiting = [start]
         for _ in range(_SEGMENTS):
             if not waiting:
                 return found
             stretch = waiting.pop()
-            left = Line(phase.at + self.balls.period, phase.slope, phase.rest) - stretch.time
+            left = LineInS(phase.at + self.balls.period, phase.slope, phase.rest) - stretch.time
             if left.whole < 0:
                 continue
             after = self._after(stretch, left.whole.upper(), splits)
@@ -167,8 +167,8 @@ class Follower:
         at_rest = column(self.balls.extended(t, [arb(0), arb(0)]))
         return -(self.balls.surfaces["F+"] * self.balls.fields["stick"] * at_rest)[0, 0]
 
-    def _returned(self, end: Stretch, exit_: str, phase: Line) -> Returned:
-        apart = end.time - Line(phase.at + self.balls.period, phase.slope, phase.rest)
+    def _returned(self, end: SolutionSet, exit_: str, phase: LineInS) -> Returned:
+        apart = end.time - LineInS(phase.at + self.balls.period, phase.slope, phase.rest)
         return Returned(
             exit_, end.time, apart, end.change[0], end.itinerary, end.joints, end.smooth
         )
@@ -176,8 +176,8 @@ class Follower:
     # ------------------------------------------------------------------ one segment
 
     def _after(
-        self, stretch: Stretch, longest: arb, splits: bool
-    ) -> list[tuple[str, str, Stretch]]:
+        self, stretch: SolutionSet, longest: arb, splits: bool
+    ) -> list[tuple[str, str, SolutionSet]]:
         """Return mode and exit of a segment with what starts after it, for all that may follow in a time."""
         if not stretch.smooth and stretch.time.whole.rad() > _SPREAD * self.balls.period:
             raise UndecidedError("what follows a split is spread over a long time")
@@ -200,8 +200,8 @@ class Follower:
         return self._apart(stretch, times)
 
     def _together(
-        self, stretch: Stretch, guess: tuple[str, float] | None, longest: arb, splits: bool
-    ) -> list[tuple[str, str, Stretch]]:
+        self, stretch: SolutionSet, guess: tuple[str, float] | None, longest: arb, splits: bool
+    ) -> list[tuple[str, str, SolutionSet]]:
         """Return what follows a segment that ends in one way for all solutions of the set."""
         exits = self._exits(stretch.mode)
         path = Path(self.balls.fields[stretch.mode], stretch.state.whole, longest)
@@ -223,13 +223,13 @@ class Follower:
         """Return the surfaces that end a mode, with the sign of their observable in it."""
         return [("F+", -1), ("F-", 1)] if mode == "stick" else [("v", _DIRECTION[mode])]
 
-    def _shown(self, path: Path, surface: str, sign: int, stretch: Stretch, ends: bool) -> None:
+    def _shown(self, path: Path, surface: str, sign: int, stretch: SolutionSet, ends: bool) -> None:
         order = stretch.begins if surface == "v" else 0
         finding = positive(path, self.balls.surfaces[surface] * sign, order, ends)
         if not finding.proved:
             raise UndecidedError(f"{stretch.mode}, {surface}: {finding.why}")
 
-    def _guess(self, stretch: Stretch) -> tuple[str, float] | None:
+    def _guess(self, stretch: SolutionSet) -> tuple[str, float] | None:
         """Return the exit of the solution in the middle, and about when it is, or None."""
         start = np.array([float(c.mid()) for c in stretch.state.at.entries()])
         states = self._tables[stretch.mode] @ start
@@ -250,7 +250,7 @@ class Follower:
         lasts, surface = min(found)
         return surface, float(lasts)
 
-    def _changed(self, stretch: Stretch, end: Affine, after: Line) -> tuple[arb, arb]:
+    def _changed(self, stretch: SolutionSet, end: AffineMatrix, after: LineInS) -> tuple[arb, arb]:
         """Return the derivatives of time and place of the end of a segment by the phase."""
         dt, dx = stretch.change
         field = self.balls.fields[stretch.mode]
@@ -263,19 +263,19 @@ class Follower:
 
     def _onward(
         self,
-        stretch: Stretch,
+        stretch: SolutionSet,
         exit_: str,
-        time: Line,
-        state: Affine,
+        time: LineInS,
+        state: AffineMatrix,
         change: tuple[arb, arb],
         splits: bool,
-    ) -> list[tuple[str, str, Stretch]]:
+    ) -> list[tuple[str, str, SolutionSet]]:
         """Return what starts at the end of a segment, by the law."""
         state = with_zero(state, _V)
         itinerary = (*stretch.itinerary, (stretch.mode, exit_))
         middle = float(stretch.time.at.mid()), float(stretch.state.at[_X, 0].mid())
         joints = (*stretch.joints, middle)
-        base = Stretch("stick", time, state, change, itinerary, joints, stretch.smooth)
+        base = SolutionSet("stick", time, state, change, itinerary, joints, stretch.smooth)
         if stretch.mode == "stick":
             slide = _SLIDES[-_LIMIT[exit_]]
             return [(stretch.mode, exit_, replace(base, mode=slide, begins=self._released))]
@@ -285,7 +285,7 @@ class Follower:
         smooth = stretch.smooth and len(modes) == 1
         return [(stretch.mode, exit_, replace(base, mode=mode, smooth=smooth)) for mode in modes]
 
-    def _modes_after_stop(self, state: Affine) -> list[str]:
+    def _modes_after_stop(self, state: AffineMatrix) -> list[str]:
         """Return the modes that may follow a stop: rest, a slide, or one of several."""
         above, below = ((self.balls.surfaces[k] * state.whole)[0, 0] for k in ("F+", "F-"))
         found = []
@@ -299,7 +299,7 @@ class Follower:
 
     # ------------------------------------------------------------------ a set that is split
 
-    def _times(self, stretch: Stretch, longest: arb) -> list[tuple[str, FirstTimes]]:
+    def _times(self, stretch: SolutionSet, longest: arb) -> list[tuple[str, FirstTimes]]:
         """Return for each exit when it may be met first."""
         path = Path(self.balls.fields[stretch.mode], stretch.state.whole, longest)
         order = 0 if stretch.mode == "stick" else stretch.begins
@@ -309,8 +309,8 @@ class Follower:
         ]
 
     def _apart(
-        self, stretch: Stretch, times: list[tuple[str, FirstTimes]]
-    ) -> list[tuple[str, str, Stretch]]:
+        self, stretch: SolutionSet, times: list[tuple[str, FirstTimes]]
+    ) -> list[tuple[str, str, SolutionSet]]:
         """Return what may follow a segment, for each cluster of times at which it may end."""
         field, start = self.balls.fields[stretch.mode], stretch.state.whole
         if any(found.all_end and not found.clusters for _, found in times):
@@ -330,11 +330,11 @@ class Follower:
         return after
 
 
-def _ball(t: arb) -> Line:
-    return Line(arb(t.mid()), arb(0), arb(0, t.rad()))
+def _ball(t: arb) -> LineInS:
+    return LineInS(arb(t.mid()), arb(0), arb(0, t.rad()))
 
 
-def _within(field: arb_mat, start: arb_mat, times: arb) -> Affine:
+def _within(field: arb_mat, start: arb_mat, times: arb) -> AffineMatrix:
     """Return all states at some times after a start.
 
     By Taylor's theorem to the third order: about a grazing contact the first two terms nearly vanish.
@@ -348,4 +348,4 @@ def _within(field: arb_mat, start: arb_mat, times: arb) -> Affine:
     square = arb(0, 1) * (delta.abs_upper() ** 2) / 4 + delta.abs_upper() ** 2 / 4
     end = there + rate * delta + bend * square + rest * arb(0, (delta.abs_upper() ** 3) / 6)
     centre = end.mid()
-    return Affine(centre, arb_mat(end.nrows(), 1), end - centre, HALF)
+    return AffineMatrix(centre, arb_mat(end.nrows(), 1), end - centre, HALF)

@@ -16,7 +16,7 @@ import numpy as np
 from flint import arb
 
 from contfric.certify.returns import Release, ReturnMap
-from contfric.certify.stretch import Line, UndecidedError
+from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.models.balls.numbers import working
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
@@ -158,7 +158,7 @@ def _crossings(
 def _image(returns: ReturnMap, n: int, a: float, b: float) -> tuple[arb, object]:
     """Return f^n of the phases between two (an elapsed time), and the segments on the way."""
     middle, half = (arb(a) + arb(b)) / 2, (arb(b) - arb(a)) / 2
-    line, itineraries = Line(middle, half, arb(0)), []
+    line, itineraries = LineInS(middle, half, arb(0)), []
     for _ in range(n):
         line, itinerary = returns.follow(line)
         itineraries.append(itinerary)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments
-from contfric.certify.extended import Condition
+from contfric.certify.extended import EventCondition
 from contfric.certify.sign import Path, positive, touched, undecided
 from contfric.certify.verdict import Finding, Verdict
 from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
@@ -35,7 +35,7 @@ class Touch:
     after : time of a touch after the start of its segment; None at a joint
     """
 
-    condition: Condition
+    condition: EventCondition
     after: arb | None = None
 
 
@@ -43,7 +43,7 @@ class Touch:
 DURATION, JOINT, EXIT, INSIDE, ENTRY = "duration", "joint", "exit", "inside", "entry"
 
 
-class Name(NamedTuple):
+class InequalityName(NamedTuple):
     """Which inequality it is: its segment, its surface, and what it is about."""
 
     segment: int
@@ -66,9 +66,9 @@ class Inequality:
     window: Callable[[], arb | None] = lambda: None
 
     @property
-    def name(self) -> Name:
+    def name(self) -> InequalityName:
         """Which one it is."""
-        return Name(self.segment, self.surface, self.what)
+        return InequalityName(self.segment, self.surface, self.what)
 
     def named(self, system: System) -> Finding:
         """Return the finding with its place in words."""
@@ -85,7 +85,7 @@ def inequalities(
     joints: list[Vector],
     closing: Closing,
     touch: Touch | None = None,
-    loose: Collection[Name] = (),
+    loose: Collection[InequalityName] = (),
     only: Collection[int] | None = None,
 ) -> Iterator[Inequality]:
     """Return all inequalities of a chain, joint by joint.
@@ -117,10 +117,10 @@ def inequalities(
             ends = (
                 segments.exits[i] == surface
                 or segments.pins[(i + 1) % segments.count] == surface
-                or Name(i, surface, JOINT) in loose
+                or InequalityName(i, surface, JOINT) in loose
             )
             order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
-            if Name(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
+            if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
                 order = max(order, 1)  # it is not negative there, which is as good as zero
             if order and _stays(row, path.field):
                 continue
@@ -129,7 +129,7 @@ def inequalities(
             elif _is_left_held(segments, i, surface):
                 finding = touched(path, row, order, None)
             else:
-                bends = Name(i, surface, EXIT) in loose
+                bends = InequalityName(i, surface, EXIT) in loose
                 finding = positive(path, row, order, ends, bends)
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
@@ -166,7 +166,7 @@ def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[
     return {met.segment: [model.rate(met.surface, modes[met.segment])]}
 
 
-def _is_of(met: Condition, found: Inequality) -> bool:
+def _is_of(met: EventCondition, found: Inequality) -> bool:
     """Tell whether an inequality at a joint is the one that vanishes at an event."""
     what = EXIT if met.rate else JOINT
     return not (met.within or met.departs) and (met.segment, met.surface, what) == (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from flint import arb, arb_mat
 
-from contfric.certify.extended import Condition
+from contfric.certify.extended import EventCondition
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.errors import ContfricError
 from contfric.models.balls.build import ball_model
@@ -38,7 +38,7 @@ class NotLocatedError(ContfricError):
 
 
 @dataclass(frozen=True, eq=False)
-class Location:
+class EventPlace:
     """An orbit at an event, and what vanishes there; None for a multiplier.
 
     Attributes
@@ -49,11 +49,11 @@ class Location:
     """
 
     orbit: Orbit
-    condition: Condition | None
+    condition: EventCondition | None
     after: float = 0.0
 
 
-def location_of(event: Bifurcation) -> Location:
+def location_of(event: Bifurcation) -> EventPlace:
     """Return where an event happens.
 
     Raises
@@ -65,7 +65,7 @@ def location_of(event: Bifurcation) -> Location:
         raise NotLocatedError("the event was not located")
     orbit, tests = _released(event.orbit, event.tests)
     if not tests:
-        return Location(_multiplier_orbit(event), None)
+        return EventPlace(_multiplier_orbit(event), None)
     orbit, found = _shortest(orbit, tests)
     if len(found) != 1:
         raise NotLocatedError(f"{len(found)} independent conditions meet")
@@ -73,21 +73,21 @@ def location_of(event: Bifurcation) -> Location:
     if event.kind is Kind.T:
         return _tangency(orbit, test)
     if test.margin is Margin.JOINT:
-        return Location(orbit, Condition(test.segment, test.surface))
+        return EventPlace(orbit, EventCondition(test.segment, test.surface))
     if test.margin is Margin.EXIT and orbit.system.itinerary[test.segment][1] != test.surface:
-        return Location(orbit, _at_stop(orbit, test.segment, test.surface))
+        return EventPlace(orbit, _at_stop(orbit, test.segment, test.surface))
     if test.margin is Margin.EXIT:
-        return Location(orbit, Condition(test.segment, test.surface, rate=True))
+        return EventPlace(orbit, EventCondition(test.segment, test.surface, rate=True))
     if test.margin is Margin.HELD:
         hold = next(h for h in orbit.system.holds if h.segment == test.segment)
-        condition = Condition(test.segment, test.surface, within=True, departs=hold.departs)
-        return Location(orbit, condition, _least_acceleration(orbit, hold))
+        condition = EventCondition(test.segment, test.surface, within=True, departs=hold.departs)
+        return EventPlace(orbit, condition, _least_acceleration(orbit, hold))
     if test.margin is Margin.INTERIOR:
         _, after = _nearest_touch(orbit, test.segment, test.surface)
         pinned = [h.segment for h in orbit.system.holds if h.pin == test.surface]
         if test.segment in pinned and after < _AT_START:  # the load no longer falls at its stop
-            return Location(orbit, _at_stop(orbit, test.segment - 1, test.surface))
-        return Location(orbit, Condition(test.segment, test.surface, within=True), after)
+            return EventPlace(orbit, _at_stop(orbit, test.segment - 1, test.surface))
+        return EventPlace(orbit, EventCondition(test.segment, test.surface, within=True), after)
     raise NotLocatedError(f"events of a margin of the kind '{test.margin.value}' are not proved")
 
 
@@ -133,10 +133,10 @@ def _released(
     return orbit, tests
 
 
-def _at_stop(orbit: Orbit, segment: int, surface: str) -> Condition:
+def _at_stop(orbit: Orbit, segment: int, surface: str) -> EventCondition:
     """Return that an observable is stationary where the rest after a segment begins."""
     after = orbit.system.itinerary[(segment + 1) % len(orbit.system.itinerary)][0]
-    return Condition(segment, surface, departs=after)
+    return EventCondition(segment, surface, departs=after)
 
 
 def _ends(test: EventFunction, hold: Hold) -> bool:
@@ -247,7 +247,7 @@ def _is_symmetric(model: Model, joints: FloatArray, period: float) -> bool:
     return bool(np.max(np.abs(image - joints[n:])) < _VANISHED)
 
 
-def _tangency(orbit: Orbit, test: EventFunction) -> Location:
+def _tangency(orbit: Orbit, test: EventFunction) -> EventPlace:
     """Return where a surface of the test's observable is touched: inside of its segment, or at its end."""
     model = orbit.model
     names = [s.name for s in model.surfaces if test.surface in (s.name, s.observable)]
@@ -255,14 +255,16 @@ def _tangency(orbit: Orbit, test: EventFunction) -> Location:
     found = []
     for name in names:
         gap, after = _nearest_touch(orbit, test.segment, name)
-        found.append((gap, Condition(test.segment, name, within=True), after))
+        found.append((gap, EventCondition(test.segment, name, within=True), after))
         if name != orbit.system.itinerary[test.segment][1]:
             value = orbit.flow.observe(
                 model.surface_by_name[name].observable, float(end[0]), end[1:]
             )
-            found.append((abs(value - orbit.flow.level(name)), Condition(test.segment, name), 0.0))
+            found.append(
+                (abs(value - orbit.flow.level(name)), EventCondition(test.segment, name), 0.0)
+            )
     gap, condition, after = min(found, key=lambda row: row[0])
-    return Location(orbit, condition, after)
+    return EventPlace(orbit, condition, after)
 
 
 def _nearest_touch(orbit: Orbit, segment: int, surface: str) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 from contfric.certify.chain import Segments, segments_of
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
-from contfric.certify.extended import Builder, Condition
+from contfric.certify.extended import Builder, EventCondition
 from contfric.certify.zeros import in_span, zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
@@ -108,7 +108,7 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
     return _Cycle(joints, modes, resets, known, turn, orbit.periods)
 
 
-def _row(condition: Condition, segments: Segments, model: BallModel) -> Vector:
+def _row(condition: EventCondition, segments: Segments, model: BallModel) -> Vector:
     if condition.rate or condition.departs:
         return model.rate(condition.surface, condition.departs or segments.modes[condition.segment])
     return model.rows[condition.surface]

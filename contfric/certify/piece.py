@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contfric.certify.inequalities import Name
+from contfric.certify.inequalities import InequalityName
 from contfric.certify.verdict import Finding
 from contfric.models.definition import FloatArray
 
@@ -40,7 +40,7 @@ class Piece:
     flips: int = UNKNOWN
     tori: int = UNKNOWN
     linked: bool = True
-    ends: tuple[Name, ...] = ()
+    ends: tuple[InequalityName, ...] = ()
     events: tuple[str, ...] = ()
     knots: tuple[FloatArray, ...] = ()
 

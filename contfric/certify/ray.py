@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
-from contfric.certify.affine import Affine, enclosing
+from contfric.certify.affine import AffineMatrix, enclosing
 from contfric.certify.chain import Chain, Segments, block_exponential
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, around, column, zeros
@@ -53,8 +53,8 @@ class Chord:
 class Linear:
     """What is known of a chain along a chord: residual at its middle, Jacobian without and of the closure.
 
-    Each Jacobian is (value, slope, rest) as those of :class:`contfric.certify.affine.Affine`; the last column
-    is the parameter.
+    Each Jacobian is (value, slope, rest) as those of :class:`contfric.certify.affine.AffineMatrix`; the last
+    column is the parameter.
     """
 
     residual: Vector
@@ -86,7 +86,7 @@ class Ray:
         self.half, self.step = chord.half, chord.change[-1]
         self.slack = arb(0, chord.radii[-1].abs_upper())
         self.values = self.chain.joints(chord.middle[:-1])
-        self._fields: dict[str, Affine] = {}
+        self._fields: dict[str, AffineMatrix] = {}
 
     def linear(self) -> Linear:
         """Return residual and Jacobian."""
@@ -106,12 +106,12 @@ class Ray:
 
     # ------------------------------------------------------------------ matrices of the model
 
-    def _by_parameter(self, at: arb_mat, slope: arb_mat, wide: arb_mat) -> Affine:
+    def _by_parameter(self, at: arb_mat, slope: arb_mat, wide: arb_mat) -> AffineMatrix:
         """Return what depends on the parameter only, from its derivative at the middle and over the box."""
         found = enclosing(at, slope * self.step, wide * self.step, self.half)
-        return Affine(at, found.slope, found.rest + wide * self.slack, self.half)
+        return AffineMatrix(at, found.slope, found.rest + wide * self.slack, self.half)
 
-    def _field(self, mode: str) -> Affine:
+    def _field(self, mode: str) -> AffineMatrix:
         if mode not in self._fields:
             central, wide = self.central, self.wide
             assert central.slopes is not None
@@ -121,7 +121,7 @@ class Ray:
             )
         return self._fields[mode]
 
-    def _surface(self, name: str) -> tuple[Affine, Affine]:
+    def _surface(self, name: str) -> tuple[AffineMatrix, AffineMatrix]:
         """Return a surface's row, and its derivative by the parameter."""
         central, wide = self.central.slopes, self.wide.slopes
         assert central is not None
@@ -131,11 +131,11 @@ class Ray:
         )
         return row, self._split(wide.surfaces[name])
 
-    def _split(self, ball: arb_mat) -> Affine:
+    def _split(self, ball: arb_mat) -> AffineMatrix:
         """Return an enclosure whose dependence on s is not known."""
         middle = ball.mid()
         nothing = arb_mat(ball.nrows(), ball.ncols())
-        return Affine(middle, nothing, ball - middle, self.half)
+        return AffineMatrix(middle, nothing, ball - middle, self.half)
 
     # ------------------------------------------------------------------ a joint
 
@@ -148,7 +148,7 @@ class Ray:
         slack = arb(0, self.chord.radii[at].abs_upper())
         return self.values[k][0], self.chord.change[at], slack
 
-    def _state(self, k: int) -> Affine:
+    def _state(self, k: int) -> AffineMatrix:
         """Return the extended state at joint k."""
         t, change, slack = self._time(k)
         wide = around(t + self.half * change, slack)
@@ -162,7 +162,7 @@ class Ray:
             else (spread[j] - rates[j]) * change * self.half + spread[j] * slack
             for j in range(len(at))
         ]
-        return Affine(column(at), column(slope), column(rest), self.half)
+        return AffineMatrix(column(at), column(slope), column(rest), self.half)
 
     def _moved_states(self, k: int) -> list[tuple[arb, arb]]:
         """Return change and slack of the states at joint k."""
@@ -178,7 +178,7 @@ class Ray:
             for row in self.segments.closure
         ]
 
-    def _rate(self, k: int) -> Affine:
+    def _rate(self, k: int) -> AffineMatrix:
         """Return the derivative of the extended state at joint k by time."""
         t, change, slack = self._time(k)
         wide = around(t + self.half * change, slack)
@@ -188,7 +188,7 @@ class Ray:
             (w - r) * change * self.half + w * slack for w, r in zip(spread, rates, strict=True)
         ]
         value = self.central.by_time(t, 1)
-        return Affine(column(value), column(slope), column(rest), self.half)
+        return AffineMatrix(column(value), column(slope), column(rest), self.half)
 
     def _duration(self, i: int) -> tuple[arb, arb, arb]:
         """Return the duration of a segment at the middle, its change, and what is next to the chord."""
@@ -200,7 +200,7 @@ class Ray:
 
     # ------------------------------------------------------------------ a segment
 
-    def _flow(self, i: int) -> tuple[Affine, Affine]:
+    def _flow(self, i: int) -> tuple[AffineMatrix, AffineMatrix]:
         """Return exp(M D), and its derivative by the parameter at the same D."""
         mode = self.segments.modes[i]
         field, wide = self._field(mode), self.wide
@@ -217,22 +217,22 @@ class Ray:
         rest += matrix * matrix * near * square
         size = matrix.nrows()
         one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
-        short = Affine(one, slope, rest, self.half)
+        short = AffineMatrix(one, slope, rest, self.half)
         if all(x.is_zero() for x in by.entries()):
             nothing = arb_mat(size, size)
             at = (self.central.fields[mode] * middle).exp()
-            flow = Affine(at, nothing, nothing, self.half) * short
-            return flow, Affine(nothing, nothing, nothing, self.half)
+            flow = AffineMatrix(at, nothing, nothing, self.half) * short
+            return flow, AffineMatrix(nothing, nothing, nothing, self.half)
         first, first_by = self._at_middle(mode, middle, matrix, by)
         mean = near * by * near  # d/dp exp(M delta) = delta times a mean of products
         slope = (by * change).mid()
         rest = (mean * change - slope) * self.half + mean * (slack + duration - middle)
-        other = Affine(arb_mat(size, size), slope, rest, self.half)
+        other = AffineMatrix(arb_mat(size, size), slope, rest, self.half)
         return first * short, first_by * short + first * other
 
     def _at_middle(
         self, mode: str, duration: arb, field: arb_mat, by: arb_mat
-    ) -> tuple[Affine, Affine]:
+    ) -> tuple[AffineMatrix, AffineMatrix]:
         """Return exp(M d) and its derivative by the parameter for a fixed duration d."""
         central, wide = self.central.slopes, self.wide.slopes
         assert central is not None
@@ -277,7 +277,7 @@ class Ray:
                 rows[row][-1] += value
         return [end.at[j, 0] - self.values[i + 1][1 + j] for j in range(n)]
 
-    def _condition(self, i: int) -> tuple[int, Affine, Affine]:
+    def _condition(self, i: int) -> tuple[int, AffineMatrix, AffineMatrix]:
         """Return the last equation of a segment: at which joint which row vanishes, and its slope."""
         pin = self.segments.pins[i]
         name = pin if isinstance(pin, str) else pin[1] if pin else self.segments.exits[i]
@@ -289,7 +289,7 @@ class Ray:
             row = row * self._field(pin[0])
         return (i if pin else i + 1), row, slope
 
-    def _observed(self, row: int, at: int, observable: Affine, slope: Affine) -> arb:
+    def _observed(self, row: int, at: int, observable: AffineMatrix, slope: AffineMatrix) -> arb:
         """Write the derivatives of an observable at a joint; return its value at the middle."""
         state, rate = self._state(at), self._rate(at)
         self._add(row, at, 0, observable * rate, 0, 0)
@@ -303,9 +303,9 @@ class Ray:
 
     def _put(self, row: int, joint: int, k: int, value: arb) -> None:
         one = arb_mat([[value]])
-        self._add(row, joint, k, Affine(one, arb_mat(1, 1), arb_mat(1, 1), self.half), 0, 0)
+        self._add(row, joint, k, AffineMatrix(one, arb_mat(1, 1), arb_mat(1, 1), self.half), 0, 0)
 
-    def _add(self, row: int, joint: int, k: int, values: Affine, a: int, b: int) -> None:
+    def _add(self, row: int, joint: int, k: int, values: AffineMatrix, a: int, b: int) -> None:
         """Add an entry by number k of a joint; those by the last joint belong to the first one."""
         three = values.entry(a, b)
         if joint < self.segments.count:

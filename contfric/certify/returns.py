@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
-from contfric.certify.affine import Affine
+from contfric.certify.affine import AffineMatrix
 from contfric.certify.chain import Chain, segments_of
 from contfric.certify.closing import closing_of, keeps
 from contfric.certify.inequalities import inequalities
-from contfric.certify.stretch import Line, UndecidedError, ended, released
+from contfric.certify.stretch import LineInS, UndecidedError, ended, released
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, numbers
@@ -59,7 +59,7 @@ class ReturnMap:
         self.balls: BallModel = ball_model(model, model.mapping(vector))
         self.systems: dict[tuple[tuple[str, str], ...], System] = {}
 
-    def follow(self, phase: Line) -> tuple[Line, tuple[tuple[str, str], ...]]:
+    def follow(self, phase: LineInS) -> tuple[LineInS, tuple[tuple[str, str], ...]]:
         """Return the phase of the next release, and the segments until then.
 
         Raises
@@ -82,7 +82,7 @@ class ReturnMap:
             if not found.finding.proved:
                 raise UndecidedError(str(found.named(system)))
         shift = self.balls.period / 2 if system.half else arb(0)
-        return Line(time.at - shift, time.slope, time.rest), itinerary
+        return LineInS(time.at - shift, time.slope, time.rest), itinerary
 
     def _system(self, itinerary: tuple[tuple[str, str], ...]) -> System:
         if itinerary not in self.systems:
@@ -94,11 +94,11 @@ class ReturnMap:
             self.systems[itinerary] = system
         return self.systems[itinerary]
 
-    def _joint(self, time: Line, state: Affine) -> Vector:
+    def _joint(self, time: LineInS, state: AffineMatrix) -> Vector:
         return [time.whole, *numbers(state.whole)[: self.balls.states]]
 
     def _simulated(
-        self, time: arb, state: Affine
+        self, time: arb, state: AffineMatrix
     ) -> tuple[tuple[tuple[str, str], ...], list[float]]:
         """Return the segments until the next release from a start in the middle, and how long they last."""
         start = float(time.mid())

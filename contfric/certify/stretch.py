@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
-from contfric.certify.affine import Affine
+from contfric.certify.affine import AffineMatrix
 from contfric.errors import ContfricError
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import column, numbers
@@ -28,7 +28,7 @@ class UndecidedError(ContfricError):
 
 
 @dataclass(frozen=True)
-class Line:
+class LineInS:
     """A number that depends on s: ``at + s slope + rest``."""
 
     at: arb
@@ -40,16 +40,16 @@ class Line:
         """All values."""
         return self.at + self.slope * HALF + self.rest
 
-    def __add__(self, other: Line) -> Line:
+    def __add__(self, other: LineInS) -> LineInS:
         """Return the sum."""
-        return Line(self.at + other.at, self.slope + other.slope, self.rest + other.rest)
+        return LineInS(self.at + other.at, self.slope + other.slope, self.rest + other.rest)
 
-    def __sub__(self, other: Line) -> Line:
+    def __sub__(self, other: LineInS) -> LineInS:
         """Return the difference."""
-        return Line(self.at - other.at, self.slope - other.slope, self.rest - other.rest)
+        return LineInS(self.at - other.at, self.slope - other.slope, self.rest - other.rest)
 
 
-def released(balls: BallModel, names: tuple[str, ...], phase: Line) -> Affine:
+def released(balls: BallModel, names: tuple[str, ...], phase: LineInS) -> AffineMatrix:
     """Return the extended state that lies on as many surfaces as it has states, at an interval of phases."""
     n = balls.states
     at, rates = balls.extended(phase.at, [arb(0)] * n), balls.by_time(phase.at, 1)
@@ -64,12 +64,12 @@ def released(balls: BallModel, names: tuple[str, ...], phase: Line) -> Affine:
     for part in parts:
         y = matrix.solve(rows * part * -1)
         found.append(column([*(y[k, 0] for k in range(n)), *numbers(part)[n:]]))
-    return Affine(found[0], found[1], found[2], HALF)
+    return AffineMatrix(found[0], found[1], found[2], HALF)
 
 
 def ended(
-    balls: BallModel, mode: str, exit_: str, state: Affine, lasts: float
-) -> tuple[Line, Affine]:
+    balls: BallModel, mode: str, exit_: str, state: AffineMatrix, lasts: float
+) -> tuple[LineInS, AffineMatrix]:
     """Return how long a segment lasts, and the extended state at its end.
 
     Parameters
@@ -101,12 +101,12 @@ def ended(
         rest = -missed / rate
         if rest.is_finite() and extra.contains_interior(rest):
             end = _moved(field, there, slope, rest)
-            return Line(middle, slope, rest), _on(end, row, balls.states)
+            return LineInS(middle, slope, rest), _on(end, row, balls.states)
         width = 4 * width
     raise UndecidedError("a stop may be tangential")
 
 
-def _refined(field: arb_mat, row: arb_mat, state: Affine, guess: arb) -> arb:
+def _refined(field: arb_mat, row: arb_mat, state: AffineMatrix, guess: arb) -> arb:
     """Return about when the exit is met from the start in the middle; exact."""
     for _ in range(_NEWTON):
         there = (field * guess).exp() * state.at
@@ -117,7 +117,7 @@ def _refined(field: arb_mat, row: arb_mat, state: Affine, guess: arb) -> arb:
     return guess
 
 
-def _moved(field: arb_mat, there: Affine, slope: arb, extra: arb) -> Affine:
+def _moved(field: arb_mat, there: AffineMatrix, slope: arb, extra: arb) -> AffineMatrix:
     """Return the state after a further time ``s slope + extra``."""
     delta = slope * HALF + extra
     size = field.nrows()
@@ -126,15 +126,15 @@ def _moved(field: arb_mat, there: Affine, slope: arb, extra: arb) -> Affine:
     rest = (field * slope - linear) * HALF + field * extra
     square = arb(0, (delta * delta / 2).abs_upper())
     rest += field * field * (field * (delta * HALF)).exp() * square
-    return Affine(one, linear, rest, HALF) * there
+    return AffineMatrix(one, linear, rest, HALF) * there
 
 
-def _fixed(matrix: arb_mat) -> Affine:
+def _fixed(matrix: arb_mat) -> AffineMatrix:
     nothing = arb_mat(matrix.nrows(), matrix.ncols())
-    return Affine(matrix, nothing, nothing, HALF)
+    return AffineMatrix(matrix, nothing, nothing, HALF)
 
 
-def _on(state: Affine, row: arb_mat, states: int) -> Affine:
+def _on(state: AffineMatrix, row: arb_mat, states: int) -> AffineMatrix:
     """Return a state that is known to lie on a surface: a row of one state says that it is exactly zero."""
     entries = numbers(row)
     found = [k for k, x in enumerate(entries) if not x.is_zero()]
@@ -143,10 +143,10 @@ def _on(state: Affine, row: arb_mat, states: int) -> Affine:
     return with_zero(state, found[0])
 
 
-def with_zero(state: Affine, k: int) -> Affine:
+def with_zero(state: AffineMatrix, k: int) -> AffineMatrix:
     """Return a state of which one entry is known to be exactly zero."""
     parts = [list(numbers(part)) for part in (state.at, state.slope, state.rest)]
     for part in parts:
         part[k] = arb(0)
     at, slope, rest = (column(part) for part in parts)
-    return Affine(at, slope, rest, HALF)
+    return AffineMatrix(at, slope, rest, HALF)

@@ -2,9 +2,9 @@
 
 A file holds the knots between which the boxes are, the events of multipliers that are in them, and the event
 at which the branch ends in the first or last of them. The checker makes its own boxes of these knots, which
-are mostly shorter than those of the proof. So here a :class:`_Run` goes along the boxes of the proof by steps
-that the checker decides, each of about the length of the last one. Where they would be far shorter than the
-box of the proof, the tube ends, with the reason.
+are mostly shorter than those of the proof. So here a :class:`_GrowingTube` goes along the boxes of the proof
+by steps that the checker decides, each of about the length of the last one. Where they would be far shorter
+than the box of the proof, the tube ends, with the reason.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _UNCHECKED = "what lies between an open end (null) and the event at which the br
 _Row = list[float]
 
 
-class _Run:
+class _GrowingTube:
     """A tube that grows from knot to knot by boxes that the checker decides.
 
     Parameters
@@ -129,9 +129,9 @@ class _Run:
             return False
         return True
 
-    def turned(self) -> _Run:
+    def turned(self) -> _GrowingTube:
         """Return the same tube in the other direction."""
-        run = _Run(self.data, self.rows[-1], self.until)
+        run = _GrowingTube(self.data, self.rows[-1], self.until)
         run.rows, run.kinds = self.rows[::-1], self.kinds[::-1]
         run.ends, run.tried, run.length = self.ends[::-1], self.tried, self.length
         _, run.point = orbits_at(self.data | {"knots": run.rows[-2:]})
@@ -163,8 +163,8 @@ def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str
     return [_data(proof, run) for run in runs if len(run.rows) > 1 + all(run.ends)]
 
 
-def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
-    branch, runs, run = proof.branch, list[_Run](), None
+def _runs(proof: BranchCertificate, until: float) -> list[_GrowingTube]:
+    branch, runs, run = proof.branch, list[_GrowingTube](), None
     size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
     kept = _kept(branch)
     for k, piece in enumerate(proof.pieces):
@@ -178,7 +178,7 @@ def _runs(proof: BranchCertificate, until: float) -> list[_Run]:
             run = _from_end(proof, b, a, until)
         else:
             if run is None or not piece.linked:
-                run = _Run(_data(proof), a, until)
+                run = _GrowingTube(_data(proof), a, until)
             _on(proof, k, run, b)
         if run is not None and run not in runs:
             runs.append(run)
@@ -194,7 +194,7 @@ def _kept(branch: Branch) -> tuple[float, float]:
     return first + left_out[0], last - left_out[1]
 
 
-def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
+def _data(proof: BranchCertificate, run: _GrowingTube | None = None) -> dict[str, Any]:
     """Return a tube as plain data; without a run one that has no knots yet."""
     branch, system = proof.branch, proof.branch.system
     kinds = run.kinds if run else []
@@ -214,14 +214,16 @@ def _data(proof: BranchCertificate, run: _Run | None = None) -> dict[str, Any]:
     }
 
 
-def _from_end(proof: BranchCertificate, row: _Row, before: _Row, until: float) -> _Run | None:
+def _from_end(
+    proof: BranchCertificate, row: _Row, before: _Row, until: float
+) -> _GrowingTube | None:
     """Return the tube from an end of the branch before a knot to another knot, if one is decided."""
     ends = _ends(proof, proof.pieces[0])
     if not ends:
-        run = _Run(_data(proof), _between(row, before, _BEFORE), until)
+        run = _GrowingTube(_data(proof), _between(row, before, _BEFORE), until)
         return run if run.march(row) else None
     for end in ends:
-        run = _Run(_data(proof), row, until)
+        run = _GrowingTube(_data(proof), row, until)
         if run.finish(before, end):
             run.ends[1] = end
             run = run.turned()
@@ -229,7 +231,7 @@ def _from_end(proof: BranchCertificate, row: _Row, before: _Row, until: float) -
     return None
 
 
-def _on(proof: BranchCertificate, k: int, run: _Run, row: _Row) -> None:
+def _on(proof: BranchCertificate, k: int, run: _GrowingTube, row: _Row) -> None:
     """Let a tube go on through a box of the proof, or to the end of the branch in it."""
     piece = proof.pieces[k]
     if not piece.ends:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.starts import default_states
 from contfric.chaos.status import Motion
-from contfric.chaos.work import Task
+from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 
@@ -50,7 +50,7 @@ def empty_tile(shape: tuple[int, int, int], n: int) -> TileRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Tile(Task):
+class Tile(TileTask):
     """A task: the cells of a rectangle of the grid.
 
     Attributes

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     import numpy as np
 
 R = TypeVar("R")
-T = TypeVar("T", bound="Task")
+T = TypeVar("T", bound="TileTask")
 
 
-class Task:
+class TileTask:
     """A task: a data class whose first field is the model."""
 
     model: Model
@@ -40,7 +40,7 @@ class Task:
         raise NotImplementedError
 
 
-def _rebuilt(kind: type[Task], model: str | bytes, *rest: Any) -> Task:
+def _rebuilt(kind: type[TileTask], model: str | bytes, *rest: Any) -> TileTask:
     return kind(unpacked(model), *rest)  # type: ignore[call-arg]
 
 

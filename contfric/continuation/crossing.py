@@ -103,7 +103,7 @@ def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing |
     """Return the branch point within a distance of an orbit (scaled product), or None."""
     system = orbit.system
     active = orbit.model.index_of(settings.parameter)
-    problem = _Problem(system, orbit.vector, active, settings.width)
+    problem = _ChainProblem(system, orbit.vector, active, settings.width)
     x = np.append(orbit.joints.ravel(), orbit.vector[active] / settings.width)
     located = _moore(problem, x)
     if located is None:
@@ -120,7 +120,7 @@ def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing |
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _ChainProblem:
     """The equations in the unknowns (joints, parameter over the width of its range)."""
 
     system: System
@@ -168,7 +168,7 @@ class _Problem:
         return np.asarray(0.5 * (rows + rows.T))
 
 
-def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+def _moore(problem: _ChainProblem, x: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return unknowns and left null vector at the branch point near a point, or None."""
     residual, jacobian = problem.at(x)
     if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
@@ -207,7 +207,7 @@ def _moore(problem: _Problem, x: FloatArray) -> tuple[FloatArray, FloatArray] | 
 
 
 def _directions(
-    problem: _Problem, x: FloatArray, psi: FloatArray
+    problem: _ChainProblem, x: FloatArray, psi: FloatArray
 ) -> tuple[Direction, Direction] | None:
     """Return the directions of the two curves that cross; None if no two do."""
     basis = np.linalg.svd(problem.at(x)[1])[2][-2:]
@@ -224,7 +224,7 @@ def _directions(
     return first, second
 
 
-def _direction(problem: _Problem, d: FloatArray) -> Direction:
+def _direction(problem: _ChainProblem, d: FloatArray) -> Direction:
     count = problem.system.segments
     d = d / np.sqrt(np.sum(d[:-1] ** 2) / count + d[-1] ** 2)
     slope = 0.0 if abs(d[-1]) < _TURNS else float(d[-1]) * problem.width

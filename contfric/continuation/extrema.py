@@ -20,7 +20,7 @@ from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
-from contfric.quantities.measure import Measured, differentiated
+from contfric.quantities.measure import NumberWithGradient, differentiated
 from contfric.quantities.registry import Quantity, number_quantity
 
 if TYPE_CHECKING:
@@ -75,19 +75,19 @@ class _Step:
 
     before: Point
     after: Point
-    first: Measured
-    last: Measured
+    first: NumberWithGradient
+    last: NumberWithGradient
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
+class _ExtremumSearch:
     """The search along one branch; arclength is measured anew, in widths of the branch."""
 
     branch: Branch
     quantity: Quantity
     settings: Settings
 
-    def measured(self, point: Point) -> Measured:
+    def measured(self, point: Point) -> NumberWithGradient:
         """Return the quantity with its slope along the branch."""
         orbit = self.orbit(point)
         return differentiated(self.quantity, orbit, along(point, orbit, self.branch.parameter))
@@ -169,7 +169,7 @@ def _nearest(slopes: FloatArray) -> Iterator[float]:
 def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
     """Return the extrema of a quantity along a branch; see :meth:`contfric.Branch.extrema`."""
     quantity = number_quantity(name, branch.model, "extrema")
-    search = _Search(branch, quantity, _settings(branch))
+    search = _ExtremumSearch(branch, quantity, _settings(branch))
     found: list[Extremum] = []
     points = list(_points(branch, search))
     measured = [search.measured(point) for _, point in points]
@@ -206,7 +206,7 @@ def _settings(branch: Branch) -> Settings:
     return Settings(branch.parameter, low, high, "", "", width, stability=False)
 
 
-def _points(branch: Branch, search: _Search) -> Iterator[tuple[int, Point]]:
+def _points(branch: Branch, search: _ExtremumSearch) -> Iterator[tuple[int, Point]]:
     """Yield the points of a branch with their unit tangents, those that have one, and their indices."""
     scale, count = search.settings.scale, branch.joints.shape[1]
     active = branch.model.index_of(branch.parameter)

@@ -51,7 +51,7 @@ def kept(stability: bool) -> tuple[str, ...]:
 
 
 @dataclass(eq=False)
-class Columns:
+class GrowingColumns:
     """What is kept of many points: one array a column, which grows in place.
 
     (Pieces that are joined at the end would take the memory twice.)
@@ -80,7 +80,7 @@ class Columns:
         array.resize((self.count, *array.shape[1:]), refcheck=False)
         return array
 
-    def take_behind(self, name: str, back: Columns) -> NDArray[Any]:
+    def take_behind(self, name: str, back: GrowingColumns) -> NDArray[Any]:
         """Return one column after the reversed one of another side, without their common first row."""
         before = back.take(name)[:0:-1]
         array, shift = self.take(name), len(before)
@@ -120,7 +120,7 @@ class Side:
     at_event: bool = False
     largest: float = np.inf
     bifurcations: list[Bifurcation] = field(default_factory=list)
-    _kept: Columns = field(default_factory=lambda: Columns({}))
+    _kept: GrowingColumns = field(default_factory=lambda: GrowingColumns({}))
     _fresh: int = 0
     autonomous: bool = False
     solves: int = 0
@@ -241,7 +241,7 @@ class Side:
         self._kept.append({name: getattr(self.rows, name)[rows] for name in self.names})
         self._fresh = stop
 
-    def columns(self) -> Columns:
+    def columns(self) -> GrowingColumns:
         """Return everything that is kept of the points; the side is finished."""
         self._keep(self.last + 1)
         return self._kept

@@ -17,7 +17,7 @@ from contfric.continuation.side import Side, first_point
 from contfric.continuation.start import start_of, too_fast
 from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
-from contfric.continuation.vertical import Family, family_near
+from contfric.continuation.vertical import VerticalFamily, family_near
 from contfric.errors import ConvergenceError, function_of
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable
@@ -107,7 +107,11 @@ def follow_orbit(
 
 
 def follow_family(
-    family: Family, settings: Settings, progress: Progress | None = None, *, keep: bool = False
+    family: VerticalFamily,
+    settings: Settings,
+    progress: Progress | None = None,
+    *,
+    keep: bool = False,
 ) -> Branch | None:
     """Trace a family of orbits at one value of the parameter, along another one in which it is regular."""
     inside = family.settings(settings)

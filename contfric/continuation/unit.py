@@ -143,7 +143,7 @@ def unit_of(orbit: Orbit) -> Unit:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class UnitPiece:
     """One unit of a whole orbit.
 
     Attributes
@@ -158,7 +158,7 @@ class Piece:
     itinerary: Itinerary
 
 
-def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
+def pieces(orbit: Orbit, unit: Unit) -> list[UnitPiece]:
     """Return the units of a whole orbit.
 
     Raises
@@ -175,11 +175,11 @@ def pieces(orbit: Orbit, unit: Unit) -> list[Piece]:
     for j, (start, stop) in enumerate(zip(cuts, [*cuts[1:], cuts[0]], strict=True)):
         segments = range(start, stop if stop > start else stop + count)
         itinerary = tuple(orbit.itinerary[i % count] for i in segments)
-        found.append(Piece(j, segments, unit.image_itinerary(itinerary, j)))
+        found.append(UnitPiece(j, segments, unit.image_itinerary(itinerary, j)))
     return found
 
 
-def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: Piece, reason: str) -> Form:
+def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: UnitPiece, reason: str) -> Form:
     """Return one unit of a whole orbit as a form, as the first unit of the motion."""
     count = len(orbit.itinerary)
     locations = [i % count for i in piece.segments]

@@ -65,7 +65,7 @@ Border = tuple[FloatArray, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class VerticalFamily:
     """An orbit inside of a family, at its value.
 
     Attributes
@@ -125,7 +125,7 @@ def _end_at(end: End, moved: dict[int, Bifurcation], vector: FloatArray) -> End:
     return replace(end, bifurcation=known or _at(end.bifurcation, vector))
 
 
-def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> Family | None:
+def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> VerticalFamily | None:
     """Return the family at one value of a parameter that an orbit belongs to, or is next to; None if none is.
 
     ``within`` is how far from the orbit's parameter its value may be.
@@ -144,7 +144,7 @@ def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> Family | Non
         return None
 
 
-def _next_to(whole: Orbit, active: int, within: float) -> Family | None:
+def _next_to(whole: Orbit, active: int, within: float) -> VerticalFamily | None:
     """Return the family next to an orbit on its whole period."""
     by_joints = equations_at(whole.system, whole.joints, whole.vector, False)[1]
     left, size, right = np.linalg.svd(by_joints)
@@ -171,7 +171,7 @@ def _next_to(whole: Orbit, active: int, within: float) -> Family | None:
     return None
 
 
-def _at_value(orbit: Orbit, active: int, border: Border) -> Family | None:
+def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | None:
     """Return the orbit of a family next to a guess, at the value at which w F_b vanishes."""
     start = float(orbit.vector[active])
     trials: list[tuple[float, float]] = []
@@ -202,7 +202,7 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> Family | None:
     if not regular or there.residual > _SOLVED or _is_flat(trials, scale):
         return None
     missed = abs(float(w @ residual))
-    return Family(there, along.reshape(joints.shape), active, other, missed)
+    return VerticalFamily(there, along.reshape(joints.shape), active, other, missed)
 
 
 def _secant(trials: list[tuple[float, float]], start: float) -> float:

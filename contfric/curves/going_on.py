@@ -20,7 +20,7 @@ from contfric.continuation.points import EXTRA, Point, Rows
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Problem, problem_of, tangency
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray
@@ -174,7 +174,7 @@ def _locations(problem: Problem) -> int:
     return len(problem.condition.pinned) * (2 if problem.system.half else 1)
 
 
-def starts_of(event: Bifurcation, box: Box, largest: float) -> Iterator[Start]:
+def starts_of(event: Bifurcation, box: PlaneRanges, largest: float) -> Iterator[Start]:
     """Yield the directions in which an event's curve leaves a point with admissible orbits."""
     try:
         problem = problem_of(event, box)

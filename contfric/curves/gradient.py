@@ -19,7 +19,7 @@ import numpy as np
 from contfric.continuation.events import Bifurcation
 from contfric.curves.points import first_curve_point
 from contfric.curves.problem import Problem, problem_of
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.orbit.gradient import Gradient
 
@@ -64,7 +64,7 @@ def plane_of(bifurcation: Bifurcation, one: str, other: str) -> Problem:
     """Return the problem of the curve in the plane of two parameters, scaled by their sizes."""
     here = np.array([bifurcation.params[one], bifurcation.params[other]])
     size = 1.0 + np.abs(here)
-    return problem_of(bifurcation, Box((one, other), here - size, here + size))
+    return problem_of(bifurcation, PlaneRanges((one, other), here - size, here + size))
 
 
 def slope_of(bifurcation: Bifurcation, one: str, other: str) -> float:

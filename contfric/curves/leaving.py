@@ -35,7 +35,7 @@ from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, itineraries_at, prove, starts_of
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem, border_of, problem_of
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
 from contfric.models.definition import FloatArray
@@ -153,7 +153,7 @@ def _odd_null_vector(orbit: Orbit, problem: Problem, whole: Orbit) -> FloatArray
     return phi / float(np.sqrt(np.sum(phi**2) / len(phi)))
 
 
-def fold_problem(orbit: Orbit, box: Box) -> Problem | None:
+def fold_problem(orbit: Orbit, box: PlaneRanges) -> Problem | None:
     """Return the problem of the fold curve of an orbit that has a multiplier 1."""
     with suppress(ContfricError):
         return problem_of(Bifurcation(Kind.SN, orbit.params, orbit), box)

@@ -30,7 +30,7 @@ _BEND, _ONE, _MINUS, _PAIR = range(EXTRA)
 
 
 @dataclass(eq=False)
-class Crossing:
+class LocatedChange:
     """A change between two points of a curve: the located point, and what it is."""
 
     point: Point
@@ -38,7 +38,9 @@ class Crossing:
     terminal: bool
 
 
-def crossings(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
+def crossings(
+    problem: Problem, before: Point, after: Point, border: FloatArray
+) -> list[LocatedChange]:
     """Return what happens between two points, in order; the first terminal one is the last."""
     found = [
         *_margins(problem, before, after, border),
@@ -53,7 +55,9 @@ def crossings(problem: Problem, before: Point, after: Point, border: FloatArray)
     return [c for c in found[: last + 1] if c.terminal or end - c.point.arc > _OF_EVENT]
 
 
-def _margins(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
+def _margins(
+    problem: Problem, before: Point, after: Point, border: FloatArray
+) -> list[LocatedChange]:
     """Return the first margin that is violated, with its group."""
     tests = problem.system.tests
     located = []
@@ -79,7 +83,7 @@ def _margins(problem: Problem, before: Point, after: Point, border: FloatArray) 
     special = _special(
         problem, point, CodimTwo.MEETS, kind, (tests[first], *_rest(group, tests[first])), fine
     )
-    return [Crossing(point, special, True)]
+    return [LocatedChange(point, special, True)]
 
 
 def _rest(group: tuple[EventFunction, ...], first: EventFunction) -> tuple[EventFunction, ...]:
@@ -104,7 +108,9 @@ def _special(
     return SpecialPoint(kind, name, orbit.params, orbit, meets, tests, point.arc, located)
 
 
-def _smooth(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
+def _smooth(
+    problem: Problem, before: Point, after: Point, border: FloatArray
+) -> list[LocatedChange]:
     """Return what the normal form and the multipliers tell."""
     base = len(before.tests) - EXTRA
     found = []
@@ -121,7 +127,7 @@ def _smooth(problem: Problem, before: Point, after: Point, border: FloatArray) -
         if named is not None:
             kind, meets = named
             special = _special(problem, point, kind, meets, located=fine)
-            found.append(Crossing(point, special, False))
+            found.append(LocatedChange(point, special, False))
     return found
 
 
@@ -153,7 +159,9 @@ def _smooth_kind(
     return (CodimTwo.SN_BP if half else CodimTwo.SN_PD), other_kind
 
 
-def _labels(problem: Problem, before: Point, after: Point, border: FloatArray) -> list[Crossing]:
+def _labels(
+    problem: Problem, before: Point, after: Point, border: FloatArray
+) -> list[LocatedChange]:
     """Return the tangencies that the curve meets: segments are relabelled, and the curve goes on."""
     rows = problem.system.layout.labels
     observables = problem.model.observables
@@ -163,5 +171,5 @@ def _labels(problem: Problem, before: Point, after: Point, border: FloatArray) -
         point, _ = locate(problem, before, after, border, by_label(int(k), old))
         test = EventFunction(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
-        found.append(Crossing(point, special, False))
+        found.append(LocatedChange(point, special, False))
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.touching import resting_domain
-from contfric.curves.ranges import Box, limits_of
+from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
@@ -46,7 +46,7 @@ class Problem:
     kind: Kind
     system: System
     vector: FloatArray
-    box: Box
+    box: PlaneRanges
     condition: Condition
     test: EventFunction | None
 
@@ -87,7 +87,7 @@ class Problem:
         return Orbit(self.system, joints.copy(), vector, 0.0)
 
 
-def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
+def problem_of(bifurcation: Bifurcation, box: PlaneRanges) -> Problem:
     """Return the problem of a bifurcation's curve.
 
     Raises
@@ -101,7 +101,7 @@ def problem_of(bifurcation: Bifurcation, box: Box) -> Problem:
     return make(bifurcation, orbit, box)
 
 
-def check_start(bifurcation: Bifurcation, box: Box) -> None:
+def check_start(bifurcation: Bifurcation, box: PlaneRanges) -> None:
     """Refuse what no curve starts from.
 
     Raises
@@ -127,7 +127,7 @@ def check_start(bifurcation: Bifurcation, box: Box) -> None:
         raise ParameterError(f"{kind.value} is at {where}, outside of the ranges")
 
 
-def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:
+def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
     from contfric.curves.conditions import SPECTRAL, Condition
 
     kind = bifurcation.kind
@@ -148,7 +148,7 @@ def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Probl
     return Problem(kind, orbit.system, orbit.vector.copy(), box, condition, None)
 
 
-def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: Box) -> Problem:
+def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
     from contfric.curves.conditions import EXIT, INTERIOR, JOINT, START, Condition
 
     kind, system, model = bifurcation.kind, orbit.system, orbit.model

@@ -19,7 +19,7 @@ from contfric.curves.locating import locate_zero
 from contfric.curves.points import end_of_march, march_on
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
-from contfric.curves.ranges import Box, box_of
+from contfric.curves.ranges import PlaneRanges, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import Progress, largest_step
 from contfric.errors import (
@@ -153,7 +153,7 @@ def trace_both(
 
 
 def _start(
-    orbit: Orbit, quantity: Quantity, value: float, box: Box, progress: Progress | None
+    orbit: Orbit, quantity: Quantity, value: float, box: PlaneRanges, progress: Progress | None
 ) -> Orbit:
     """Return an orbit on the curve: the given one, or one of a branch through it."""
     if not orbit.converged:

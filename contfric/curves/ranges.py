@@ -49,7 +49,7 @@ class Ranges:
 
 
 @dataclass(frozen=True, eq=False)
-class Box(Ranges):
+class PlaneRanges(Ranges):
     """A plane: two parameters with their ranges."""
 
     names: tuple[str, str]
@@ -57,7 +57,7 @@ class Box(Ranges):
 
 def box_of(
     model: Model, parameters: tuple[str, str], ranges: Mapping[str, tuple[float, float]]
-) -> Box:
+) -> PlaneRanges:
     """Check two parameters with their ranges.
 
     Raises
@@ -71,7 +71,7 @@ def box_of(
             f"{shown(parameters)}"
         )
     found = ranges_of(model, parameters, ranges)
-    return Box(parameters, found.low, found.high)
+    return PlaneRanges(parameters, found.low, found.high)
 
 
 def ranges_of(

@@ -27,7 +27,7 @@ from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.locating import locate_zero
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
-from contfric.curves.ranges import Box
+from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import Progress
 from contfric.errors import ConvergenceError, ParameterError
@@ -62,7 +62,7 @@ def critical_pair(mu: NDArray[np.complex128]) -> tuple[int, int]:
 class OnCircle(Held):
     """The condition of a curve of NS, in place of a quantity that is held."""
 
-    box: Box
+    box: PlaneRanges
 
     @property
     def title(self) -> str:
@@ -109,7 +109,7 @@ def angle_of(orbit: Orbit) -> float:
 
 def continue_torus(
     bifurcation: Bifurcation,
-    box: Box,
+    box: PlaneRanges,
     largest: float,
     max_points: int = MOST_POINTS,
     progress: Progress | None = None,

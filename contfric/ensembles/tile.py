@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
-from contfric.chaos.work import Task
+from contfric.chaos.work import TileTask
 from contfric.continuation.events import EndReason
 from contfric.ensembles.reading import events_of, named_crossings
 from contfric.ensembles.rows import Drawn, Rows
@@ -32,7 +32,7 @@ _LIMITS = (EndReason.POINTS, EndReason.WORK)
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleTile(Task):
+class EnsembleTile(TileTask):
     """A task: some samples of an ensemble.
 
     Attributes

@@ -23,7 +23,7 @@ _AWAY = 1e4
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing:
+class LocatedSignChange:
     """A change of sign of a test function on a step, located.
 
     Attributes
@@ -57,7 +57,7 @@ class Run:
 
     arc: Arc
     places: list[CurvePoint] = field(default_factory=list)
-    crossings: list[Crossing] = field(default_factory=list)
+    crossings: list[LocatedSignChange] = field(default_factory=list)
     end: BranchEnd = BranchEnd.POINTS
 
 
@@ -131,7 +131,7 @@ def _over(arc: Arc, place: CurvePoint, limits: MarchLimits) -> float | None:
     return limits.high if value > limits.high else limits.low if value < limits.low else None
 
 
-def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
+def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignChange]:
     """Return the events of a step, in their order."""
     found = _pairs(arc, before, after)
     for name, test in _tests(arc, before):
@@ -141,7 +141,7 @@ def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]
         place = arc.located(before, after, test)
         if place is None:
             continue
-        found.append(Crossing(name, place, before, after))
+        found.append(LocatedSignChange(name, place, before, after))
     vertex = [c for c in found if c.test == "BP"]
     found = [  # the vertex of a pitchfork is no fold of its own
         c
@@ -157,7 +157,7 @@ def _eigenvalues(arc: Arc, place: CurvePoint) -> np.ndarray:
     return np.asarray(arc.region.eigenvalues(arc.state(place.x), arc.parameters(place.x)))
 
 
-def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
+def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignChange]:
     """Return the complex pairs that cross the imaginary axis on a step.
 
     If m eigenvalues have a positive real part at one end and more at the other, the real part that is the
@@ -169,7 +169,7 @@ def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[Crossing]:
         place = arc.located(before, after, partial(_real_part, arc, k))
         oscillating = place is not None and is_oscillating(_eigenvalues(arc, place), k)
         if place is not None and oscillating:
-            found.append(Crossing("H", place, before, after))
+            found.append(LocatedSignChange("H", place, before, after))
         k += 2 if oscillating else 1
     return found
 
@@ -194,7 +194,7 @@ def _height(arc: Arc, k: int, at: CurvePoint) -> float:
     return float(arc.region.heights.value(arc.state(at.x), arc.parameters(at.x))[k])
 
 
-def _leaves(arc: Arc, crossing: Crossing) -> bool:
+def _leaves(arc: Arc, crossing: LocatedSignChange) -> bool:
     """Tell whether an equilibrium leaves the region of its mode at an event."""
     if crossing.test in ("SN", "BP", "H"):
         return False

@@ -12,7 +12,7 @@ from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, EquilibriumKind, HopfPoint
 from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.hopf import centre_of
-from contfric.equilibria.march import Crossing, MarchLimits, Run, march
+from contfric.equilibria.march import LocatedSignChange, MarchLimits, Run, march
 from contfric.equilibria.regions import check_no_excitation, scale_of
 from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, checked_range, real_number, shown, whole_number
@@ -168,7 +168,7 @@ def _is_start(first: _Leg, partner: Partner) -> bool:
     return again and bool(np.max(np.abs(at - partner.place.x)) < 1e-9)
 
 
-def _event(arc: Arc, crossing: Crossing) -> tuple[EquilibriumEvent | None, Partner | None]:
+def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | None, Partner | None]:
     """Return an event as a result, and what meets the branch there; None where nothing happens."""
     place = crossing.place
     y, p = arc.state(place.x), arc.parameters(place.x)

@@ -29,7 +29,7 @@ Datum: TypeAlias = Measured | Series | Jump
 Near: TypeAlias = Orbit | Bifurcation | None
 
 
-class Answer(NamedTuple):
+class Prediction(NamedTuple):
     """What a condition says to its data.
 
     Attributes
@@ -50,7 +50,7 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Condition:
+class FitCondition:
     """Data that were measured at the same parameters; a jump is one by itself.
 
     Attributes
@@ -64,7 +64,7 @@ class Condition:
     data: tuple[Datum, ...]
     free: tuple[str, ...]
 
-    def answer(self, params: Mapping[str, float], near: Near) -> Answer:
+    def answer(self, params: Mapping[str, float], near: Near) -> Prediction:
         """Solve it at some parameters, from where it was.
 
         Raises
@@ -80,14 +80,14 @@ class Condition:
             else self._of_orbit(params, near)
         )
 
-    def _of_jump(self, jump: Jump, params: Mapping[str, float], near: Near) -> Answer:
+    def _of_jump(self, jump: Jump, params: Mapping[str, float], near: Near) -> Prediction:
         values = self.model.mapping(self.model.vector({**params, jump.parameter: jump.value}))
         event = moved_event(near if isinstance(near, Bifurcation) else jump.event, values)
         by_free = np.array([[slope_of(event, jump.parameter, name) for name in self.free]])
         missed = np.array([event.params[jump.parameter] - jump.value])
-        return Answer(event, (missed / jump.sigma,), (by_free / jump.sigma,))
+        return Prediction(event, (missed / jump.sigma,), (by_free / jump.sigma,))
 
-    def _of_orbit(self, params: Mapping[str, float], near: Near) -> Answer:
+    def _of_orbit(self, params: Mapping[str, float], near: Near) -> Prediction:
         orbit = self._refined(params, near)
         if orbit is not None:
             return self._compared(orbit)
@@ -107,7 +107,7 @@ class Condition:
         fits = refined.converged and refined.admissible and refined.stable
         return refined if fits else None
 
-    def _compared(self, orbit: Orbit) -> Answer:
+    def _compared(self, orbit: Orbit) -> Prediction:
         columns = [self.model.index_of(name) for name in self.free]
         residuals, slopes = [], []
         for datum in self.data:
@@ -116,10 +116,10 @@ class Condition:
             measured = datum.values if isinstance(datum, Series) else datum.value
             residuals.append((values - measured) / datum.sigma)
             slopes.append(by_all[:, columns] / datum.sigma)
-        return Answer(orbit, tuple(residuals), tuple(slopes))
+        return Prediction(orbit, tuple(residuals), tuple(slopes))
 
 
-def attempt(condition: Condition, params: Mapping[str, float], near: Near) -> Answer | None:
+def attempt(condition: FitCondition, params: Mapping[str, float], near: Near) -> Prediction | None:
     """Solve a condition in a worker; None where it fails, which the caller finds again, with the reason."""
     try:
         return condition.answer(params, near)
@@ -129,11 +129,11 @@ def attempt(condition: Condition, params: Mapping[str, float], near: Near) -> An
 
 @remembered(without=("executor",))
 def answers_of(
-    conditions: tuple[Condition, ...],
+    conditions: tuple[FitCondition, ...],
     params: Mapping[str, float],
     near: tuple[Near, ...],
     executor: Executor | None,
-) -> list[Answer]:
+) -> list[Prediction]:
     """Return what the conditions say at some parameters; what an executor does not solve is solved here.
 
     Raises
@@ -150,8 +150,8 @@ def answers_of(
 
 
 def _submitted(
-    executor: Executor | None, condition: Condition, params: Mapping[str, float], near: Near
-) -> Future[Answer | None] | None:
+    executor: Executor | None, condition: FitCondition, params: Mapping[str, float], near: Near
+) -> Future[Prediction | None] | None:
     if executor is None:
         return None
     try:
@@ -160,7 +160,7 @@ def _submitted(
         return None
 
 
-def _result(future: Future[Answer | None] | None) -> Answer | None:
+def _result(future: Future[Prediction | None] | None) -> Prediction | None:
     """Return what a worker has found; None if that is nothing, or was lost with its worker."""
     try:
         return None if future is None else future.result()
@@ -170,7 +170,7 @@ def _result(future: Future[Answer | None] | None) -> Answer | None:
 
 def conditions_of(
     model: Model, data: tuple[Datum, ...], free: tuple[str, ...]
-) -> list[tuple[Condition, list[int]]]:
+) -> list[tuple[FitCondition, list[int]]]:
     """Return the conditions of some data, each with the numbers of its data."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for k, datum in enumerate(data):
@@ -178,6 +178,6 @@ def conditions_of(
         values = sorted((str(name), float(value)) for name, value in datum.params.items())
         groups.setdefault((*own, *values), []).append(k)
     return [
-        (Condition(model, tuple(data[k] for k in numbers), free), numbers)
+        (FitCondition(model, tuple(data[k] for k in numbers), free), numbers)
         for numbers in groups.values()
     ]

@@ -24,7 +24,7 @@ from contfric.errors import (
     items_of,
     shown,
 )
-from contfric.fitting.condition import Answer, Datum, Near, answers_of, conditions_of
+from contfric.fitting.condition import Datum, Near, Prediction, answers_of, conditions_of
 from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import signal_of
 from contfric.fitting.result import INTERRUPTED, Fit
@@ -312,7 +312,7 @@ class _Problem:
             self.best = trial
         return trial
 
-    def _answers(self, x: FloatArray) -> list[Answer]:
+    def _answers(self, x: FloatArray) -> list[Prediction]:
         conditions = tuple(condition for condition, _ in self.conditions)
         params = {**self.params, **self.values(x)}
         return answers_of(conditions, params, tuple(self.near), self._executor)

@@ -17,7 +17,7 @@ from contfric.orbit.orbit import Orbit
 from contfric.quantities.duals import Kinks
 from contfric.quantities.inside import Inside, inside_of
 from contfric.quantities.measure import differentiated
-from contfric.quantities.motion import Motion
+from contfric.quantities.motion import OrbitMotion
 from contfric.quantities.registry import number_quantity
 
 
@@ -51,7 +51,7 @@ def _series(data: Series, orbit: Orbit) -> tuple[FloatArray, FloatArray]:
 
     The period moves with the parameters, so that a time that is folded moves against the orbit's.
     """
-    motion = Motion(orbit, by_parameters(orbit))
+    motion = OrbitMotion(orbit, by_parameters(orbit))
     inside = inside_of(orbit.model)
     function = inside.function(signal_of(data.signal, inside))
     times = np.asarray(data.times)

@@ -135,7 +135,7 @@ class Forms:
 
 
 @dataclass
-class Tables:
+class CodedTables:
     """The tables of :mod:`contfric.flow.coded`, while they are written.
 
     Attributes

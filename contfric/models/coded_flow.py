@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.models.coded import Forms, Tables, forms_of
+from contfric.models.coded import CodedTables, Forms, forms_of
 from contfric.models.columns import Column
 from contfric.models.description import ModeText
 from contfric.models.not_affine import NotAffineError
@@ -33,7 +33,9 @@ class CodedFlow:
     def __init__(self, forms: Forms) -> None:
         self._forms, self._declared = forms, len(forms.observables)
         description = forms.description
-        self._tables = Tables([p.name for p in description.parameters], len(description.states))
+        self._tables = CodedTables(
+            [p.name for p in description.parameters], len(description.states)
+        )
         tables, data = self._tables, self._tables.data
         order = {o.name: c for c, o in enumerate(description.observables)}
         data["observable_of"] = Column([tables.group([form]) for form in forms.observables])

@@ -37,7 +37,7 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class ContactsAtRest:
     """Contacts at rest.
 
     Attributes

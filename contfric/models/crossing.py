@@ -52,7 +52,7 @@ _MARK = {1: "+", -1: "-", 0: 0}
 _NOTHING = 1e-12
 
 
-class Crossing:
+class CrossingSurfaces:
     """Two switching surfaces that cross, and the four modes around the place."""
 
     def __init__(self, formulas: Formulas, surfaces: tuple[str, str]) -> None:
@@ -200,7 +200,7 @@ def crossing_parts(
     EntryError
         If what motion does where they cross does not follow from the fields.
     """
-    crossing = Crossing(Formulas(description), surfaces)
+    crossing = CrossingSurfaces(Formulas(description), surfaces)
     found: dict[str, Any] = {
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
@@ -255,7 +255,7 @@ def crossing_parts(
 class _Limits:
     """The surfaces that bound sliding, on one surface and on both, put into a model as they are asked for."""
 
-    def __init__(self, crossing: Crossing, found: dict[str, Any]) -> None:
+    def __init__(self, crossing: CrossingSurfaces, found: dict[str, Any]) -> None:
         self.crossing, self.found = crossing, found
         self.levels: dict[str, list[tuple[str, Any]]] = {}
 

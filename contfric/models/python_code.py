@@ -36,7 +36,7 @@ def function_of(names: Names, text: str) -> Function:
     ModelError
         If the text is no expression.
     """
-    writer = _Writer(names)
+    writer = _ExpressionWriter(names)
     result = writer.text(parse(text))
     lines = [*writer.lines, f"return {result}"]
     scope: dict[str, Any] = dict(_NAMES)
@@ -44,7 +44,7 @@ def function_of(names: Names, text: str) -> Function:
     return scope["value"]  # type: ignore[no-any-return]
 
 
-class _Writer:
+class _ExpressionWriter:
     """Writes an expression, and the named parts that it needs before it."""
 
     def __init__(self, names: Names) -> None:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.errors import ContfricError
-from contfric.models.complementarity import Rest
+from contfric.models.complementarity import ContactsAtRest
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.matrices import is_zero, times
 from contfric.models.python_code import Function, function_of
@@ -130,7 +130,7 @@ class SharedWays:
         resting: Sequence[Contact],
         states: States,
         place: Place,
-    ) -> Rest:
+    ) -> ContactsAtRest:
         names = {c.name for c in resting}
         acting = [
             (c.name, letter)
@@ -149,7 +149,7 @@ class SharedWays:
             return value("free", name) + sum(value("push", name, *other) for other in acting)
 
         own = [c.name for c in resting]
-        return Rest(
+        return ContactsAtRest(
             np.array([[value("mobility", a, b) for b in own] for a in own]),
             np.array([free(name) for name in own]),
             np.array([[value("pull", name, letter) for name in own] for letter in "pn"]),

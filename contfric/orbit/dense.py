@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _MOST_SAMPLES = 10_000_000
 
 
-class Stretch(NamedTuple):
+class DenseSegment(NamedTuple):
     """A segment: its mode, time, phase and state at its start, duration, and exit (empty of the last)."""
 
     mode: str
@@ -41,7 +41,7 @@ def event_times(trajectory: Trajectory, view: FlowView) -> FloatArray:
     return np.asarray(cycles * view.period + np.array([*trajectory.times, phase]))
 
 
-def stretches(trajectory: Trajectory) -> list[Stretch]:
+def stretches(trajectory: Trajectory) -> list[DenseSegment]:
     """Cut a trajectory at its events."""
     model = trajectory.model
     view = model.view(model.vector(trajectory.params))
@@ -53,7 +53,9 @@ def stretches(trajectory: Trajectory) -> list[Stretch]:
     for k, end in enumerate(times):
         exits = model.surfaces[trajectory.exits[k]].name if k < len(trajectory) else ""
         if modes[k]:
-            found.append(Stretch(modes[k], time, phase, state, max(0.0, float(end - time)), exits))
+            found.append(
+                DenseSegment(modes[k], time, phase, state, max(0.0, float(end - time)), exits)
+            )
         if k < len(trajectory):
             time, phase, state = float(end), float(trajectory.times[k]), trajectory.states[k]
             if model.reset_at(modes[k], exits) is not None:

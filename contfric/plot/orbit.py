@@ -25,7 +25,7 @@ from contfric.plot.orbit_artists import (
     draw_surfaces,
     legend_handles,
 )
-from contfric.plot.pieces import Piece, pieces_of, rest_bounds
+from contfric.plot.pieces import DomainPiece, pieces_of, rest_bounds
 from contfric.plot.save import axes_or_new, figure_or_new, name_axes
 from contfric.plot.style import NEXT_TO, SMALL, TEXT, sized
 
@@ -98,7 +98,7 @@ def _draw_plane(new: Axes, orbit: Orbit, plane: tuple[str, str] | None) -> list[
     return named
 
 
-def _draw_in_time(new: Axes, orbit: Orbit, pieces: Sequence[Piece]) -> list[Anchor]:
+def _draw_in_time(new: Axes, orbit: Orbit, pieces: Sequence[DomainPiece]) -> list[Anchor]:
     """Draw the only state of an orbit over one period."""
     times = [(p.times - float(orbit.cycle[0, 0])) / orbit.period for p in pieces]
     state = orbit.model.states[0]

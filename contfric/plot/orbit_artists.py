@@ -16,7 +16,7 @@ from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor
 from contfric.plot.names import parameter_label, surface_label
 from contfric.plot.pieces import (
-    Piece,
+    DomainPiece,
     is_sliding,
     level,
     observe,
@@ -47,7 +47,7 @@ def value_of(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
     return observe(orbit, name, time, state)
 
 
-def along(orbit: Orbit, pieces: Sequence[Piece], name: str) -> list[FloatArray]:
+def along(orbit: Orbit, pieces: Sequence[DomainPiece], name: str) -> list[FloatArray]:
     """Return a state or an observable along each piece."""
     return [
         np.array([value_of(orbit, name, t, y) for t, y in zip(p.times, p.states, strict=True)])
@@ -58,7 +58,7 @@ def along(orbit: Orbit, pieces: Sequence[Piece], name: str) -> list[FloatArray]:
 def draw_pieces(
     ax: Axes,
     model: Model,
-    pieces: Sequence[Piece],
+    pieces: Sequence[DomainPiece],
     across: Sequence[FloatArray],
     up: Sequence[FloatArray],
 ) -> None:
@@ -71,7 +71,7 @@ def draw_pieces(
             line.set_linestyle(_HELD)
 
 
-def _is_hold(model: Model, piece: Piece) -> bool:
+def _is_hold(model: Model, piece: DomainPiece) -> bool:
     """Tell whether a piece is a hold: what ends it is no surface."""
     return piece.exit not in model.surface_by_name
 
@@ -120,7 +120,7 @@ def _name_level(ax: Axes, text: str, value: float, vertical: bool) -> None:
 
 
 def draw_moving_surfaces(
-    ax: Axes, orbit: Orbit, pieces: Sequence[Piece], across: str, up: str
+    ax: Axes, orbit: Orbit, pieces: Sequence[DomainPiece], across: str, up: str
 ) -> list[Anchor]:
     """Draw ticks where the orbit crosses a surface, along the surface as it is at that moment.
 
@@ -150,7 +150,9 @@ def draw_moving_surfaces(
     return anchors
 
 
-def draw_rest_bands(ax: Axes, orbit: Orbit, pieces: Sequence[Piece], across: str, up: str) -> None:
+def draw_rest_bands(
+    ax: Axes, orbit: Orbit, pieces: Sequence[DomainPiece], across: str, up: str
+) -> None:
     """Draw where a stick could rest on the axis, at the moment at which it begins."""
     for piece in pieces:
         if not is_sliding(orbit.model, piece.domain):
@@ -213,7 +215,7 @@ def _stop_marker(sticks: bool, x: Sequence[float] = (), y: Sequence[float] = ())
     )
 
 
-def legend_handles(orbit: Orbit, pieces: Sequence[Piece]) -> list[Line2D | Patch]:
+def legend_handles(orbit: Orbit, pieces: Sequence[DomainPiece]) -> list[Line2D | Patch]:
     """Return the entries of the legend: domains in the order of the orbit, stops, bands."""
     model, colours = orbit.model, domain_colours(orbit.model)
     visited, labels = list(dict.fromkeys(p.domain for p in pieces)), domain_labels(model)

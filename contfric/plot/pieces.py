@@ -22,7 +22,7 @@ _BISECTIONS = 45
 
 
 @dataclass(frozen=True)
-class Piece:
+class DomainPiece:
     """Part of an orbit inside one domain: times (k,) and states (k, n), both ends included.
 
     After an impact the first two rows are the states before and after it, at the same time.
@@ -51,9 +51,9 @@ def level(orbit: Orbit, surface: Surface) -> float:
     return orbit.flow.level(surface.name)
 
 
-def pieces_of(orbit: Orbit, points: int = 400) -> list[Piece]:
+def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
     """Cut one period of an orbit at its joints and where it crosses a surface in between."""
-    found: list[Piece] = []
+    found: list[DomainPiece] = []
     for i, ((mode, exit_), joint, start, end) in enumerate(
         zip(orbit.itinerary, orbit.cycle, orbit.begins, orbit.ends, strict=True)
     ):
@@ -73,7 +73,7 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[Piece]:
             rows = [first, *states[inside], last]
             if struck and before == start[0]:
                 own, rows = np.array([before, *own]), [joint[1:], *rows]
-            found.append(Piece(domain, i, own, np.array(rows), surface))
+            found.append(DomainPiece(domain, i, own, np.array(rows), surface))
             before = time
     return found
 
@@ -128,7 +128,7 @@ def is_sliding(model: Model, domain: str) -> bool:
     return model.mode_by_name[model.domain_by_name[domain].mode].sliding
 
 
-def rest_limits(orbit: Orbit, piece: Piece) -> tuple[float, float] | None:
+def rest_limits(orbit: Orbit, piece: DomainPiece) -> tuple[float, float] | None:
     """Return the displacements between which the piece could rest when it begins.
 
     The two surfaces that bound a sliding domain are met along the first state by Newton's method

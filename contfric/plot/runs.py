@@ -23,7 +23,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class Run:
+class StabilityRun:
     """Part of a branch with one stability: x has shape (m,), y (m, quantities)."""
 
     stable: bool | None
@@ -54,7 +54,7 @@ def quantity(source: Branch | Orbit, row: QuantityLike) -> FloatArray:
     return np.atleast_1d(values)
 
 
-def stability_runs(branch: Branch, row: QuantityLike) -> list[Run]:
+def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
     """Cut a branch where its stability changes.
 
     Consecutive runs share the point of change, which is the located bifurcation. A branch whose
@@ -62,14 +62,14 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[Run]:
     is one run too.
     """
     vertices = _vertices(branch, row)
-    runs: list[Run] = []
+    runs: list[StabilityRun] = []
     start = 0
     states = [False] * (len(vertices) - 1) if branch.bridge else list(_between(vertices))
     for k in range(1, len(states) + 1):
         if k == len(states) or states[k] is not states[start]:
             part = vertices[start : k + 1]
             x, y = np.array([v.x for v in part]), np.array([v.y for v in part])
-            runs.append(Run(states[start], x, y))
+            runs.append(StabilityRun(states[start], x, y))
             start = k
     return runs
 

@@ -28,7 +28,7 @@ from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
 from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside
-from contfric.quantities.motion import Directions, IndexArray, Motion, Nodes, Place
+from contfric.quantities.motion import Directions, IndexArray, Nodes, OrbitMotion, Place
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
@@ -56,7 +56,7 @@ class Measuring:
     kinks : what is one-sided, and why
     """
 
-    motion: Motion
+    motion: OrbitMotion
     inside: Inside
     kinks: list[str] = field(default_factory=list)
 
@@ -153,7 +153,7 @@ class Measuring:
         return total
 
     def _resolved(
-        self, motion: Motion, asked: Functional, function: Function, size: float = 0.0
+        self, motion: OrbitMotion, asked: Functional, function: Function, size: float = 0.0
     ) -> list[Resolved]:
         for each in () if asked.kind == WORK else self.inside.variants(asked):
             size = max(size, least_size(motion.pieces, each))
@@ -295,16 +295,16 @@ class Measuring:
         return Dual(np.full(2, best), np.array([ahead, behind]))
 
     @cached_property
-    def _still(self) -> Motion:
+    def _still(self) -> OrbitMotion:
         """The same solution without directions."""
-        return self.motion if self.motion.directions is None else Motion(self.motion.orbit)
+        return self.motion if self.motion.directions is None else OrbitMotion(self.motion.orbit)
 
     @cached_property
-    def _timed(self) -> Motion:
+    def _timed(self) -> OrbitMotion:
         """The same solution in one direction in which nothing moves: for rates, its derivatives by time."""
         joints, vector = self.motion.orbit.joints, self.motion.orbit.vector
         nothing = np.zeros((*joints.shape, 1)), np.zeros((len(vector), 1))
-        return Motion(self.motion.orbit, Directions(*nothing))
+        return OrbitMotion(self.motion.orbit, Directions(*nothing))
 
 
 def _over(slopes: FloatArray, divisor: float) -> FloatArray:
@@ -325,7 +325,7 @@ def _squared(function: Function) -> Function:
     return square
 
 
-def _turning(function: Function, motion: Motion, cycles: int, wave: str) -> Function:
+def _turning(function: Function, motion: OrbitMotion, cycles: int, wave: str) -> Function:
     """Return a function times a wave of so many cycles in the period of the orbit."""
     period = motion.orbit.period
     rate = 2.0 * math.pi * cycles / period

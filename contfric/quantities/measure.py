@@ -18,7 +18,7 @@ from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.extreme import integrated, moved_peak, peak_of
 from contfric.quantities.functionals import Measuring
 from contfric.quantities.inside import inside_of
-from contfric.quantities.motion import Directions, Motion
+from contfric.quantities.motion import Directions, OrbitMotion
 from contfric.quantities.registry import NAMED, Quantity
 from contfric.quantities.special import impact_velocity, multiplier, sticking
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class NumberWithGradient:
     """A number with its derivatives in D directions.
 
     Attributes
@@ -73,7 +73,9 @@ def of_orbits(quantity: Quantity, orbits: Iterable[Orbit]) -> FloatArray:
     return np.array([of_orbit(quantity, orbit) for orbit in orbits], dtype=np.float64)
 
 
-def differentiated(quantity: Quantity, orbit: Orbit, directions: Directions | None) -> Measured:
+def differentiated(
+    quantity: Quantity, orbit: Orbit, directions: Directions | None
+) -> NumberWithGradient:
     """Return a quantity of an orbit with its derivatives in some directions.
 
     Raises
@@ -87,28 +89,30 @@ def differentiated(quantity: Quantity, orbit: Orbit, directions: Directions | No
         )
     functional = integrated(quantity)
     if functional is not None:
-        measuring = Measuring(Motion(orbit, directions), inside_of(orbit.model))
+        measuring = Measuring(OrbitMotion(orbit, directions), inside_of(orbit.model))
         with np.errstate(all="ignore"):
             value, slopes = measuring.smooth(functional)
-        return Measured(value, slopes, slopes)
+        return NumberWithGradient(value, slopes, slopes)
     found = None if directions is None else _extreme(quantity, orbit, directions)
     return found or _measured(quantity.parsed, orbit, directions)
 
 
-def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> Measured | None:
+def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> NumberWithGradient | None:
     """Return the extremum of an observable by compiled code; None if it is no such, or is reached twice."""
     peak = peak_of(quantity)
     found = None if peak is None else moved_peak(peak, orbit, directions)
-    return None if found is None else Measured(found[0], found[1], found[1])
+    return None if found is None else NumberWithGradient(found[0], found[1], found[1])
 
 
-def _measured(parsed: Parsed, orbit: Orbit, directions: Directions | None) -> Measured:
+def _measured(parsed: Parsed, orbit: Orbit, directions: Directions | None) -> NumberWithGradient:
     """Return an expression of an orbit, its functionals resolved."""
-    measuring = Measuring(Motion(orbit, directions), inside_of(orbit.model))
+    measuring = Measuring(OrbitMotion(orbit, directions), inside_of(orbit.model))
     with np.errstate(all="ignore"):
         found = _value(parsed, measuring)
     ahead, behind = found.slopes
-    return Measured(float(found.values[0]), ahead, behind, tuple(dict.fromkeys(measuring.kinks)))
+    return NumberWithGradient(
+        float(found.values[0]), ahead, behind, tuple(dict.fromkeys(measuring.kinks))
+    )
 
 
 def _value(parsed: Parsed, measuring: Measuring) -> Dual:

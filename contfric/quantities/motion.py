@@ -232,7 +232,7 @@ class Nodes(Place):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class OrbitMotion:
     """A whole orbit as its segments, in directions that it may move in.
 
     Parameters

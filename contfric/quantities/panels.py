@@ -81,7 +81,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Cut:
+class ArgumentZero:
     """A share of a segment at which an argument of a kink changes its sign; ``number`` says which one."""
 
     share: float
@@ -96,7 +96,7 @@ class Resolved:
     function: Function
     what: str
     panels: list[Panel] = field(default_factory=list)
-    cuts: list[Cut] = field(default_factory=list)
+    cuts: list[ArgumentZero] = field(default_factory=list)
 
     def value(self, shares: FloatArray) -> Dual:
         """Return the function at some shares of the segment."""
@@ -109,7 +109,7 @@ class Resolved:
             found += self._moving(cut)
         return found
 
-    def _moving(self, cut: Cut) -> FloatArray:
+    def _moving(self, cut: ArgumentZero) -> FloatArray:
         """Return what the solution of a jump adds: the jump times how far its time moves against the segment.
 
         At the jump the argument a is zero; a fixed share moves it by da, time by its rate, so that the jump
@@ -317,7 +317,7 @@ def integral(resolved: Sequence[Resolved]) -> tuple[float, FloatArray]:
     return value, jumps + (half * lasts) @ slopes + means @ d_lasts
 
 
-def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> Cut | None:
+def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> ArgumentZero | None:
     """Return the first root of an argument of a kink between nodes; None if no sign changes."""
     best: tuple[float, int, float] | None = None
     for number, argument in enumerate(arguments):
@@ -338,4 +338,4 @@ def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> Cut |
         return float(noted.arguments[number].values[0])
 
     # to the last digits of a share
-    return Cut(float(brentq(argument_at, low, high, xtol=1e-16, rtol=1e-15)), number)
+    return ArgumentZero(float(brentq(argument_at, low, high, xtol=1e-16, rtol=1e-15)), number)

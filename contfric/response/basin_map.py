@@ -49,7 +49,7 @@ PHASE = "phase"
 
 
 @dataclass(frozen=True, eq=False)
-class _Job:
+class _BasinJob:
     """Starts to be labelled, one after the other."""
 
     model: Model
@@ -139,7 +139,7 @@ def basins(
     _check_size(model, axes)
     period = model.view(vector).period
     states = _states(model, axes, fixed)
-    job = _Job(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
+    job = _BasinJob(model, vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)
     for orbit in () if orbits is None else given_orbits(model, vector, orbits):
         attractors.add(orbit)
@@ -228,7 +228,9 @@ def _states(model: Model, axes: Mapping[str, FloatArray], at: Mapping[str, float
     return states.reshape(-1, len(model.states))
 
 
-def _record(job: _Job, attractors: Attractors, axes: Mapping[str, FloatArray]) -> dict[str, Any]:
+def _record(
+    job: _BasinJob, attractors: Attractors, axes: Mapping[str, FloatArray]
+) -> dict[str, Any]:
     """Describe the computation, so that tiles of another one are not taken for its."""
     return {
         **versions(job.model),
@@ -248,7 +250,7 @@ def _unknown(rows: BasinRows) -> IntArray:
     return np.flatnonzero((rows.labels < 0) & np.isin(rows.motions, _UNKNOWN))
 
 
-def _find_by_seeds(job: _Job, attractors: Attractors) -> None:
+def _find_by_seeds(job: _BasinJob, attractors: Attractors) -> None:
     """Find the orbits of some starts, spread over the grid.
 
     What no orbit catches is followed to the end, and then for its exponent, which takes many times as long as
@@ -267,7 +269,9 @@ def _find_by_seeds(job: _Job, attractors: Attractors) -> None:
         left, tries = _search(job, attractors, left, tries)[0], 2 * tries
 
 
-def _search(job: _Job, attractors: Attractors, left: IntArray, tries: int) -> tuple[IntArray, bool]:
+def _search(
+    job: _BasinJob, attractors: Attractors, left: IntArray, tries: int
+) -> tuple[IntArray, bool]:
     """Look for the orbits of the first of some starts, until there is a new one.
 
     To follow what no orbit catches takes long. Where every start has an orbit of its own, as on a continuum,
@@ -287,7 +291,11 @@ def _search(job: _Job, attractors: Attractors, left: IntArray, tries: int) -> tu
 
 
 def _label(
-    job: _Job, attractors: Attractors, chosen: IntArray, rows: BasinRows, kept: TileFolder | None
+    job: _BasinJob,
+    attractors: Attractors,
+    chosen: IntArray,
+    rows: BasinRows,
+    kept: TileFolder | None,
 ) -> None:
     """Label some starts, tile by tile, as any executor computes them."""
     parts = job.parts(chosen)
@@ -304,7 +312,7 @@ def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:
     rows.motions[part] = found.motions
 
 
-def _resolve(job: _Job, attractors: Attractors, rows: BasinRows) -> None:
+def _resolve(job: _BasinJob, attractors: Attractors, rows: BasinRows) -> None:
     """Find the orbits of what is periodic and unknown, until nothing is left that has one."""
     left, tries = _unknown(rows), 1
     while len(left):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contfric.chaos.rows import FollowingLimits, follow, new_stop, starting, until_interrupted
 from contfric.chaos.status import Motion
-from contfric.chaos.work import Task
+from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
@@ -35,7 +35,7 @@ class BasinRows:
 
 
 @dataclass(frozen=True, eq=False)
-class BasinTile(Task):
+class BasinTile(TileTask):
     """A task: some starts of the same parameters.
 
     Attributes

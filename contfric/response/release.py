@@ -38,7 +38,7 @@ _MET = 1e-12
 _BYTES = 512
 
 
-class _Release(NamedTuple):
+class _WayOutOfRest(NamedTuple):
     """A way out of rest: mode, surface, mode that follows, surfaces that it starts on as bits."""
 
     mode: int
@@ -150,7 +150,7 @@ def _record(whole: ReleaseTile, tile: int) -> dict[str, Any]:
     }
 
 
-def release_of(model: Model, surface: str | None) -> tuple[_Release, str]:
+def release_of(model: Model, surface: str | None) -> tuple[_WayOutOfRest, str]:
     """Return the way out of rest, and the surface that the mode rests on."""
     wanted = [m for m in model.modes if m.sliding]
     if model.autonomous or len(model.states) != 2 or not wanted:
@@ -174,10 +174,10 @@ def release_of(model: Model, surface: str | None) -> tuple[_Release, str]:
     rests = next((n for n, sign in domain.signs.items() if sign == 0), surface)
     mode, k, found = model.mode_index[domain.mode], model.surface_index[surface], tables(model)
     on = int(found.landed[mode, k] | (found.lies_on[mode] & found.kept[mode, k]))
-    return _Release(mode, k, model.mode_index[target.mode], on), rests
+    return _WayOutOfRest(mode, k, model.mode_index[target.mode], on), rests
 
 
-def image_of(model: Model, release: _Release) -> tuple[int, int] | None:
+def image_of(model: Model, release: _WayOutOfRest) -> tuple[int, int] | None:
     """Return (mode, surface) of the image of a release under the symmetry; None if there is no other."""
     if model.symmetry is None:
         return None
@@ -198,7 +198,7 @@ def _gap(
 
 
 def _state_at(
-    model: Model, vector: FloatArray, release: _Release, rests: str, t: float
+    model: Model, vector: FloatArray, release: _WayOutOfRest, rests: str, t: float
 ) -> FloatArray:
     """Return the state at a release at a time: on both surfaces, by Newton's method, or nan."""
     y = np.zeros(len(model.states))
@@ -215,7 +215,9 @@ def _state_at(
     return np.full(len(y), np.nan)
 
 
-def _leaves(model: Model, vector: FloatArray, release: _Release, t: float, y: FloatArray) -> bool:
+def _leaves(
+    model: Model, vector: FloatArray, release: _WayOutOfRest, t: float, y: FloatArray
+) -> bool:
     """Tell whether rest comes to its limit there, from within."""
     if not np.all(np.isfinite(y)):
         return False
@@ -228,7 +230,7 @@ def _leaves(model: Model, vector: FloatArray, release: _Release, t: float, y: Fl
 def _shifts(
     model: Model,
     vector: FloatArray,
-    release: _Release,
+    release: _WayOutOfRest,
     period: float,
     times: FloatArray,
     states: FloatArray,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.chaos.work import Task
+from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.response.collecting import collect, repeats_of
@@ -48,7 +48,7 @@ class ReleaseRows:
 
 
 @dataclass(frozen=True, eq=False)
-class ReleaseTile(Task):
+class ReleaseTile(TileTask):
     """A task: some releases at the same parameters.
 
     Attributes

@@ -38,7 +38,7 @@ class StableEnd(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class HalfStretch:
     """A stretch of a half: its points, those of them that a break leads to, and from where it goes on.
 
     Attributes
@@ -63,7 +63,7 @@ def _stretch(
     steps: tuple[float, float],
     most: int,
     section: SectionMap,
-) -> Stretch:
+) -> HalfStretch:
     """Follow a half by so many points.
 
     Parameters
@@ -73,7 +73,7 @@ def _stretch(
     """
     half = Half(section, [last], direction, *corners)
     step, end = half.grow(*steps, most)
-    return Stretch(np.array(half.points[1:]), half.breaks, half.direction, step, end)
+    return HalfStretch(np.array(half.points[1:]), half.breaks, half.direction, step, end)
 
 
 @dataclass

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.chaos.work import Task
+from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.response.collecting import collect
@@ -39,7 +39,7 @@ class StretchRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch(Task):
+class Stretch(TileTask):
     """A task: some values of a sweep, one after the other.
 
     Attributes

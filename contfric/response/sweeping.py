@@ -36,7 +36,7 @@ _BYTES = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class _Job:
+class _SweepJob:
     """A sweep to be computed; ``defined`` are the numbers of the values at which the model is."""
 
     model: Model
@@ -160,7 +160,9 @@ def sweep(
         at = vector.copy()
         at[model.index_of(parameter)] = grid[defined[0 if name == "up" else -1]]
         starts[name] = checked_state(model, at, state)
-    job = _Job(model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts)
+    job = _SweepJob(
+        model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts
+    )
     kept = None if folder is None else open_tiles(folder, job.record())
     runs = _computed(job, executor, kept, progress)
     return Sweep(model, parameter, grid, vector, section, runs)
@@ -206,7 +208,7 @@ def _defined(
 
 
 def _computed(
-    job: _Job, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+    job: _SweepJob, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
 ) -> dict[str, SweepRun]:
     parts = -(-len(job.defined) // STRETCH)
     done: dict[str, list[StretchRows]] = {name: [] for name in job.directions}
@@ -254,7 +256,7 @@ def compiled(model: Model) -> None:
     assert cut_solutions.dispatcher is not None
 
 
-def _run(job: _Job, direction: str, stretches: Sequence[StretchRows]) -> SweepRun:
+def _run(job: _SweepJob, direction: str, stretches: Sequence[StretchRows]) -> SweepRun:
     """Return the stretches of a direction as one, from the lowest value up."""
     outcomes = np.full(len(job.values), Outcome.OUTSIDE.code, dtype=np.uint8)
     outcomes[job.defined] = Outcome.MISSING.code

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from pydantic import ConfigDict, Field
 
 from contfric.base.yaml_lines import LocatedYaml, read_yaml
-from contfric.base.yaml_schema import Part, Truth, validated
+from contfric.base.yaml_schema import SchemaPart, Truth, validated
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
 from contfric.models.paths import is_path, relative_model
@@ -19,7 +19,7 @@ from contfric.signature.notation import Signature, split_segments, walk_fault
 SignatureLike: TypeAlias = str | Path | Signature
 
 
-class SignatureFile(Part):
+class SignatureFile(SchemaPart):
     """The content of a signature file.
 
     Examples

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from contfric.base.files import replacing
 from contfric.errors import did_you_mean
-from contfric.study.schema import FIGURES, Figure, Format, Journal, StudyFile
+from contfric.study.schema import FIGURES, Figure, Format, JournalWidth, StudyFile
 from contfric.study.wanted import Row
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class Drawing:
     kind: str
     rows: tuple[Row | str, ...]
     file: str
-    journal: Journal | None
+    journal: JournalWidth | None
     inset: bool
     task: Task
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model
 
-from contfric.base.yaml_schema import Part
+from contfric.base.yaml_schema import SchemaPart
 from contfric.study.tasks import TASKS
 from contfric.study.tasks.one_parameter import OneParameter
 from contfric.study.tasks.orbit import Simulated, Start
@@ -34,14 +34,14 @@ class Format(str, Enum):
     PDF = "pdf"
 
 
-class Journal(str, Enum):
+class JournalWidth(str, Enum):
     """Widths of figures in a journal."""
 
     SINGLE = "single"
     DOUBLE = "double"
 
 
-class Figure(Part):
+class Figure(SchemaPart):
     """One figure."""
 
     kind: str = Field(description=f"one of {', '.join(FIGURES)}")
@@ -56,13 +56,13 @@ class Figure(Part):
     inset: bool = Field(
         False, description="true: the part of a diagram in which events crowd is drawn larger"
     )
-    journal: Annotated[Journal, Field(strict=False)] | None = Field(
+    journal: Annotated[JournalWidth, Field(strict=False)] | None = Field(
         None,
         description="single or double: as wide as a column (88 mm) or the page (180 mm) of a journal",
     )
 
 
-class StudyFile(Part):
+class StudyFile(SchemaPart):
     """The content of a study file: the tasks that it asks for, and the rest."""
 
     known: ClassVar[tuple[type[Task], ...]] = ()

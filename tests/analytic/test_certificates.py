@@ -16,7 +16,7 @@ from contfric.certify.chain import Chain, segments_of
 from contfric.certify.circle import no_pair
 from contfric.certify.events import _resonates
 from contfric.certify.extended import (
-    Condition,
+    EventCondition,
     at_joint,
     touched_within,
     with_multiplier,
@@ -241,10 +241,10 @@ def test_derivatives_of_extended_systems(model: str, free: str) -> None:
         phi = [arb(float(c)) for c in rng.normal(size=len(z))]
         last = segments.count - 1
         cases = [
-            (at_joint(segments, build, Condition(0, "F+")), [*z, value]),
-            (at_joint(segments, build, Condition(last, "F+", rate=True)), [*z, value]),
+            (at_joint(segments, build, EventCondition(0, "F+")), [*z, value]),
+            (at_joint(segments, build, EventCondition(last, "F+", rate=True)), [*z, value]),
             (
-                touched_within(segments, build, Condition(0, "F+", within=True)),
+                touched_within(segments, build, EventCondition(0, "F+", within=True)),
                 [*z, arb(0.7), value],
             ),
             *(
@@ -266,7 +266,7 @@ def test_derivatives_behind_a_reset() -> None:
             build, value = builder(orbit, free), arb(orbit.params[free])
             phi = [arb(float(c)) for c in np.random.default_rng(2).normal(size=len(z))]
             for equations, x in (
-                (at_joint(segments, build, Condition(0, segments.exits[0])), [*z, value]),
+                (at_joint(segments, build, EventCondition(0, segments.exits[0])), [*z, value]),
                 (with_multiplier(segments, build, -1, phi), [*z, *phi, value]),
                 (
                     with_pair(segments, build, phi),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.crossing import _Problem
+from contfric.continuation.crossing import _ChainProblem
 from contfric.orbit.system import build_system
 
 MODEL = cf.load_model("coulomb")
@@ -75,7 +75,7 @@ def test_second_derivatives_of_long_chains(count: int) -> None:
     times = np.cumsum(lasts) - lasts[0] + 0.4
     joints = np.column_stack([times, draw.uniform(-1.5, 1.5, count), draw.normal(0.0, 0.2, count)])
     x = np.append(joints.ravel(), OMEGA / WIDTH)
-    problem = _Problem(system, vector, MODEL.index_of("Omega"), WIDTH)
+    problem = _ChainProblem(system, vector, MODEL.index_of("Omega"), WIDTH)
     psi = draw.normal(size=3 * count)
     expected, found = np.zeros((len(x), len(x))), np.empty(3 * count)
     with mp.workdps(50):

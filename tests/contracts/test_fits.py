@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.fitting.condition import Condition
+from contfric.fitting.condition import FitCondition
 from contfric.study.read import read_study
 
 TRUE = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -144,9 +144,9 @@ def test_a_fit_goes_on_from_its_folder(
 ) -> None:
     """Stopped at any call, it comes to the same bits, and what was finished is not solved again."""
     solved: list[Any] = []
-    answer = Condition.answer
+    answer = FitCondition.answer
 
-    def counted(self: Condition, params: Any, near: Any) -> Any:
+    def counted(self: FitCondition, params: Any, near: Any) -> Any:
         solved.append(params)
         if len(solved) == calls:
             raise KeyboardInterrupt
@@ -157,7 +157,7 @@ def test_a_fit_goes_on_from_its_folder(
         result = cf.fit("coulomb", data, {"S": 0.31, "S0": 0.42}, ["S", "S0"], folder=tmp_path)
         return result, len(solved) - before
 
-    monkeypatch.setattr(Condition, "answer", counted)
+    monkeypatch.setattr(FitCondition, "answer", counted)
     with suppress(KeyboardInterrupt):  # the first trial is before the search, which keeps its best
         assert not fitted()[0].complete
     calls = 0

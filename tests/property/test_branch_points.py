@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.crossing import _Problem, crossing_near
+from contfric.continuation.crossing import _ChainProblem, crossing_near
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import settings_of
 from contfric.continuation.side import first_point
@@ -143,7 +143,7 @@ def test_second_derivatives_from_several_joints_at_once(signature: str) -> None:
     """Those of each unknown moved alone, with an even and an odd number of segments."""
     orbit = cf.solve_orbit("coulomb", signature, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     active = orbit.model.index_of("Omega")
-    problem = _Problem(orbit.system, orbit.vector, active, 0.3)
+    problem = _ChainProblem(orbit.system, orbit.vector, active, 0.3)
     x = np.append(orbit.joints.ravel(), orbit.vector[active] / 0.3)
     psi = np.random.default_rng(3).normal(size=len(x) - 1)
     plain = np.empty((len(x), len(x)))

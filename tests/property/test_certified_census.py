@@ -9,7 +9,7 @@ from flint import arb
 import contfric as cf
 from contfric.certify import census_search
 from contfric.certify.following import Follower, Returned
-from contfric.certify.stretch import Line, UndecidedError
+from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
@@ -62,7 +62,7 @@ def holds(found: list[Returned], surface: str, time: float) -> bool:
 def agrees(follower: Follower, params: dict[str, float], first: float, width: float) -> bool | None:
     """See that the balls hold what simulations do; return whether the set was split, None if undecided."""
     try:
-        found = follower.follow(Line(arb(first), arb(width), arb(0)), splits=True)
+        found = follower.follow(LineInS(arb(first), arb(width), arb(0)), splits=True)
     except UndecidedError:
         return None
     for share in (-1.0, -0.3, 0.5, 1.0):
@@ -110,9 +110,9 @@ def test_the_derivative_of_a_return_is_that_of_secants() -> None:
     with working(100):
         follower = Follower(ball_model(MODEL, MODEL.mapping(MODEL.vector(PARAMS))))
         phase, width, checked = 0.7, 1e-7, 0
-        found = follower.follow(Line(arb(phase), arb(width), arb(0)), splits=False)
+        found = follower.follow(LineInS(arb(phase), arb(width), arb(0)), splits=False)
         low, high = (
-            follower.follow(Line(arb(phase + s * width), arb(0), arb(0)), splits=False)
+            follower.follow(LineInS(arb(phase + s * width), arb(0), arb(0)), splits=False)
             for s in (-1, 1)
         )
         for all_, a, b in zip(found, low, high, strict=True):

@@ -9,7 +9,7 @@ from flint import arb, ctx
 import contfric as cf
 from contfric.certify.horseshoe import Horseshoe
 from contfric.certify.returns import Release, ReturnMap
-from contfric.certify.stretch import Line, UndecidedError
+from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.response.returns import ReleaseMap
 
 PARAMS = {"Omega": 0.396, "S": 0.082, "S0": 0.4}
@@ -29,7 +29,7 @@ def test_the_map_in_balls_holds_the_sampled_one(sampled: ReleaseMap) -> None:
         for k in rng.integers(len(sampled), size=12).tolist():
             phase = float(sampled.phases[k])
             try:
-                image, _ = returns.follow(Line(arb(phase), arb(width), arb(0)))
+                image, _ = returns.follow(LineInS(arb(phase), arb(width), arb(0)))
             except UndecidedError:
                 continue
             decided += 1
@@ -39,7 +39,8 @@ def test_the_map_in_balls_holds_the_sampled_one(sampled: ReleaseMap) -> None:
                 assert image.whole.overlaps(arb(value + turns * sampled.period, 1e-9))
             # of second order: a secant says the slope
             ends = [
-                returns.follow(Line(arb(phase + s * width), arb(0), arb(0)))[0].at for s in (-1, 1)
+                returns.follow(LineInS(arb(phase + s * width), arb(0), arb(0)))[0].at
+                for s in (-1, 1)
             ]
             assert abs((ends[1] - ends[0]) / 2 - image.slope) < image.rest.rad() + 1e-20
             assert image.rest.rad() < 0.1 * abs(image.slope) + 1e-3

@@ -15,7 +15,7 @@ from contfric.orbit.gradient import by_parameters, joint_sensitivities
 from contfric.orbit.linear import jacobian_blocks, stacked
 from contfric.orbit.solve import refine
 from contfric.quantities import functionals
-from contfric.quantities.motion import Motion
+from contfric.quantities.motion import OrbitMotion
 
 PARAMS = st.fixed_dictionaries(
     {
@@ -134,7 +134,7 @@ def test_joints_move_as_the_full_matrix_says(model: str) -> None:
 def test_nodes_of_all_segments_are_those_of_each(model: str) -> None:
     """Also where motion is integrated from node to node, and a node lies before the last one."""
     orbit = cf.find_orbit(model)
-    motion = Motion(orbit, by_parameters(orbit))
+    motion = OrbitMotion(orbit, by_parameters(orbit))
     shares = np.array([0.0, 0.4, 1.0, 0.3])
     count = len(motion.segments)
     where = np.repeat(np.arange(count), len(shares))

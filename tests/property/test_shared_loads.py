@@ -11,20 +11,20 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.complementarity import Rest
+from contfric.models.complementarity import ContactsAtRest
 
 
-def rest_of(rng: np.random.Generator, ratio: float) -> Rest:
+def rest_of(rng: np.random.Generator, ratio: float) -> ContactsAtRest:
     """Return up to six contacts at rest with a random positive definite mobility."""
     k = int(rng.integers(1, 7))
     root = rng.normal(size=(k, k))
     kinetic = rng.uniform(0.0, 1.0, k)
     free = rng.normal(size=k) * rng.choice([0.3, 1.0, 3.0])
     mobility = root @ root.T + 0.05 * np.eye(k)
-    return Rest(mobility, free, np.array([-kinetic, kinetic]), kinetic * ratio)
+    return ContactsAtRest(mobility, free, np.array([-kinetic, kinetic]), kinetic * ratio)
 
 
-def all_solutions(rest: Rest) -> list[str]:
+def all_solutions(rest: ContactsAtRest) -> list[str]:
     """Return all states of the contacts that obey every condition, by trying them all.
 
     Which stick is tried one by one, the directions of those that slide at once.

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from contfric.models.check.report import Finding, ModelReport, Severity, Topic
+from contfric.models.check.report import CheckFinding, ModelReport, Severity, Topic
 
 if TYPE_CHECKING:
     from contfric.models import ModelSource
 
-__all__ = ["Finding", "ModelReport", "Severity", "Topic", "check_model"]
+__all__ = ["CheckFinding", "ModelReport", "Severity", "Topic", "check_model"]
 
 
 def check_model(model: ModelSource, params: dict[str, float] | None = None) -> ModelReport:

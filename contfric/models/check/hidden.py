@@ -41,7 +41,7 @@ Place = tuple[float, FloatArray]
 
 
 @dataclass(frozen=True)
-class Affine:
+class SignChanges:
     """A map ``(t, y) -> (t + T/2, signs * y + shift)``, and the mode whose field gave the shift."""
 
     signs: tuple[float, ...]
@@ -63,7 +63,7 @@ def check_hidden(report: ModelReport, probe: Probe) -> None:
         report.note(Topic.UNDECLARED, _advice(probe, found))
 
 
-def hidden_symmetry(probe: Probe) -> Affine | None:
+def hidden_symmetry(probe: Probe) -> SignChanges | None:
     """Return a symmetry that a model has at some parameters, declared or not; None if none was found."""
     places = {mode.name: list(_places(probe, mode.name)) for mode in probe.model.modes}
     if not all(len(own) == _STATES for own in places.values()):
@@ -74,7 +74,7 @@ def hidden_symmetry(probe: Probe) -> Affine | None:
             shift = _shift(probe, signs, (first, mode.name), places[first])
             if shift is None:
                 continue
-            found = Affine(signs, shift, (first, mode.name))
+            found = SignChanges(signs, shift, (first, mode.name))
             if _holds(probe, found, places):
                 return found
     return None
@@ -102,7 +102,7 @@ def _shift(
     wanted = np.concatenate([np.array(signs) * probe.field(pair[0], *p) for p in places])
 
     def missing(shift: FloatArray) -> FloatArray:
-        images = (Affine(signs, shift, pair).of(p, probe.period) for p in places)
+        images = (SignChanges(signs, shift, pair).of(p, probe.period) for p in places)
         found = np.concatenate([probe.field(pair[1], *image) for image in images])
         return np.asarray(found - wanted)
 
@@ -125,7 +125,7 @@ def _shift(
     return None
 
 
-def _holds(probe: Probe, found: Affine, places: dict[str, list[Place]]) -> bool:
+def _holds(probe: Probe, found: SignChanges, places: dict[str, list[Place]]) -> bool:
     """Tell whether a map takes every surface, mode and reset to another one."""
     every = [place for own in places.values() for place in own]
     surfaces = _surfaces(probe, found, every)
@@ -143,7 +143,7 @@ def _holds(probe: Probe, found: Affine, places: dict[str, list[Place]]) -> bool:
     return all(_maps_reset(probe, found, s, surfaces[s]) for s in probe.model.reset_by_surface)
 
 
-def _surfaces(probe: Probe, found: Affine, places: list[Place]) -> dict[str, str] | None:
+def _surfaces(probe: Probe, found: SignChanges, places: list[Place]) -> dict[str, str] | None:
     """Return the image of each surface, with the sides exchanged; None if one has none."""
 
     def image(name: str) -> str | None:
@@ -174,7 +174,7 @@ def _modes(model: Model, surfaces: dict[str, str]) -> dict[str, str] | None:
     return found
 
 
-def _maps_reset(probe: Probe, found: Affine, surface: str, image: str) -> bool:
+def _maps_reset(probe: Probe, found: SignChanges, surface: str, image: str) -> bool:
     """Tell whether the image of a reset is the reset at the image of its surface."""
     if image not in probe.model.reset_by_surface:
         return False
@@ -189,7 +189,7 @@ def _maps_reset(probe: Probe, found: Affine, surface: str, image: str) -> bool:
 # -------------------------------------------------------------------------------------- in words
 
 
-def _advice(probe: Probe, found: Affine) -> str:
+def _advice(probe: Probe, found: SignChanges) -> str:
     """Return what the symmetry is, and what can be done with it."""
     beside = list(_beside(probe))
     texts = _shifts(probe, found, beside)
@@ -236,11 +236,11 @@ def _beside(probe: Probe) -> Iterator[Probe]:
             return
 
 
-def _is_same(found: Affine, other: Affine | None) -> bool:
+def _is_same(found: SignChanges, other: SignChanges | None) -> bool:
     return other is not None and other.signs == found.signs
 
 
-def _shifts(probe: Probe, found: Affine, beside: list[Probe]) -> list[str]:
+def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> list[str]:
     """Return the shift of each state as an expression of the parameters, or as a number."""
     first, rows, values = found.pair[0], [], []
     for other in beside:

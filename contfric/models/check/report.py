@@ -38,7 +38,7 @@ class Severity(str, Enum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckFinding:
     """One finding: what is wrong, and what can be done."""
 
     topic: Topic
@@ -70,7 +70,7 @@ class ModelReport(Shown):
 
     model: str
     counts: dict[Topic, int] = field(default_factory=lambda: dict.fromkeys(Topic, 0))
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[CheckFinding] = field(default_factory=list)
     closed: tuple[str, ...] = ()
     integrated: dict[str, str] = field(default_factory=dict)
 
@@ -89,17 +89,17 @@ class ModelReport(Shown):
 
     def error(self, topic: Topic, message: str) -> None:
         """Note an error, once."""
-        self._note(Finding(topic, Severity.ERROR, message))
+        self._note(CheckFinding(topic, Severity.ERROR, message))
 
     def warn(self, topic: Topic, message: str) -> None:
         """Note a warning, once."""
-        self._note(Finding(topic, Severity.WARNING, message))
+        self._note(CheckFinding(topic, Severity.WARNING, message))
 
     def note(self, topic: Topic, message: str) -> None:
         """Note what is no fault, once."""
-        self._note(Finding(topic, Severity.NOTE, message))
+        self._note(CheckFinding(topic, Severity.NOTE, message))
 
-    def _note(self, finding: Finding) -> None:
+    def _note(self, finding: CheckFinding) -> None:
         if finding not in self.findings:
             self.findings.append(finding)
 

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from contfric.base.yaml_schema import Truth, keys_of
 from contfric.study.tasks.one_parameter import OneParameter
-from contfric.study.tasks.task import Job, Seeds, Skipped
+from contfric.study.tasks.task import Job, SeedsEntry, Skipped
 from contfric.study.wanted import Want
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class ExploreTask(OneParameter):
     saved_as = DIAGRAM
     own = OneParameter.own | {"seeds", "verify"}
 
-    seeds: Seeds | None = Field(None, description=keys_of(Seeds))
+    seeds: SeedsEntry | None = Field(None, description=keys_of(SeedsEntry))
     bridges: Truth | None = Field(
         None,
         description="true or false: whether orbits with holds lead on where the Poincare map "

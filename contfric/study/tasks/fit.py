@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.shown import aligned
-from contfric.base.yaml_schema import Part, keys_of
+from contfric.base.yaml_schema import SchemaPart, keys_of
 from contfric.errors import ParameterError, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FITTED, RESIDUALS = "fit.csv", "residuals.csv"
 
 
-class DatumPart(Part):
+class DatumPart(SchemaPart):
     """One measurement: a value of a quantity, a time series in a file, or the position of an event."""
 
     quantity: str | None = Field(None, min_length=1, description="a quantity that was measured")

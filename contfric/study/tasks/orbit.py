@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.base.yaml_schema import Part, keys_of
+from contfric.base.yaml_schema import SchemaPart, keys_of
 from contfric.study.tables import Table, points
 from contfric.study.tasks.task import STATE, Asked, FigureKind, Found, Job, Skipped, Task
 from contfric.study.wanted import COLUMNS
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 POINTS = "points.csv"
 
 
-class Simulated(Part):
+class Simulated(SchemaPart):
     """Start from a simulation: the orbit that the trajectory converges to."""
 
     state: list[float] | None = Field(None, description=STATE)

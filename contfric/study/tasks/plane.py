@@ -10,7 +10,7 @@ from pydantic import Field
 from contfric.base.yaml_schema import keys_of
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
-from contfric.study.tasks.task import Asked, FigureKind, Found, Job, Seeds, Task
+from contfric.study.tasks.task import Asked, FigureKind, Found, Job, SeedsEntry, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +45,7 @@ class PlaneTask(Task):
     kinds: list[str] | None = Field(
         None, min_length=1, description="a list with any of SN, BP, PD, CS, SS, AS, GS, T"
     )
-    seeds: Seeds | None = Field(None, description=keys_of(Seeds))
+    seeds: SeedsEntry | None = Field(None, description=keys_of(SeedsEntry))
     max_step: float | None = Field(
         None,
         gt=0.0,

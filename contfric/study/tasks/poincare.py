@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.study.tasks.response import Section
+from contfric.study.tasks.response import SectionTask
 from contfric.study.tasks.task import FigureKind, Job
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from contfric.study.read import Study
 
 
-class PoincareTask(Section):
+class PoincareTask(SectionTask):
     """Points of one solution on a section."""
 
     name = "poincare"

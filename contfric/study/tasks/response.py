@@ -38,7 +38,7 @@ class Response(Task):
         response.plot(ax=figure.add_subplot()).set_title(text, fontsize=sized(TEXT))
 
 
-class Section(Response):
+class SectionTask(Response):
     """A task that collects points of solutions on a section."""
 
     section: str | float | None = Field(

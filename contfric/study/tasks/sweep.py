@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from contfric.study.tasks.response import Section
+from contfric.study.tasks.response import SectionTask
 from contfric.study.tasks.task import PARAMETER, Asked, FigureKind, Job, incomplete
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class SweepDirection(str, Enum):
     DOWN = "down"
 
 
-class SweepTask(Section):
+class SweepTask(SectionTask):
     """Simulations over values of a parameter."""
 
     name = "sweep"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn, TypeAlias
 
 from pydantic import Field
 
-from contfric.base.yaml_schema import Part, keys_of
+from contfric.base.yaml_schema import SchemaPart, keys_of
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class Asked:
             )
 
 
-class Task(Part):
+class Task(SchemaPart):
     """One task; see the module.
 
     Attributes
@@ -228,7 +228,7 @@ class Task(Part):
         yield from ()
 
 
-class Seeds(Part):
+class SeedsEntry(SchemaPart):
     """Simulations whose attractors start branches that nothing else reaches."""
 
     values: int = Field(20, ge=1, description="a whole number >= 1: values of the parameter")
@@ -237,9 +237,9 @@ class Seeds(Part):
 
     def argument(self) -> dict[str, Any]:
         """Return the argument ``seeds`` of an exploration."""
-        from contfric.atlas.seeds import Seeds as Simulations
+        from contfric.atlas.seeds import Seeds
 
-        return {"seeds": Simulations(**self.model_dump())}
+        return {"seeds": Seeds(**self.model_dump())}
 
 
 def axes_text(grid: Mapping[str, list[float]]) -> str:
