@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 
-def lazily(
-    package: str, homes: Mapping[str, str]
-) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+def lazily(package: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
     """Return ``__all__``, ``__getattr__`` and ``__dir__`` of a package.
 
-    Parameters
-    ----------
-    package : its name
-    homes : modules of the package, each with the names that it has, in one text
+    Its lazy names stand once, where type checkers read them: in its source, in lines that say
+    ``from MODULE import NAME as NAME`` below ``if TYPE_CHECKING``.
 
     Examples
     --------
-    >>> names, find, _ = lazily("contfric.orbit", {"orbit": "Orbit Status", "clock": "clocked"})
-    >>> names, find("clocked").__name__
-    (['Orbit', 'Status', 'clocked'], 'clocked')
+    >>> names, find, _ = lazily("contfric.study")
+    >>> names[:2], find("Plan").__name__
+    (['Plan', 'Study'], 'Plan')
     """
-    where = {name: f"{package}.{home}" for home, names in homes.items() for name in names.split()}
+    source = sys.modules[package].__spec__.loader.get_source(package)  # type: ignore[union-attr]
+    where = {}
+    for line in source.splitlines():
+        words = line.split()
+        if line.startswith("    from ") and words[4:5] == ["as"] and words[3] == words[5]:
+            where[words[3]] = words[1]
 
     def find(name: str) -> Any:
         if name not in where:

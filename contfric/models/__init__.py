@@ -15,7 +15,7 @@ from contfric.base.lazy import lazily
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from contfric.models.definition import Model
+    from contfric.models.definition import Model as Model
     from contfric.models.oscillator import OscillatorModel
 
 __all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "Parameters", "load_model", "model_names"]
@@ -64,7 +64,7 @@ def load_model(model: ModelSource) -> Model:
     >>> load_model("coulomb").states
     ('x', 'v')
     """
-    from contfric.models.definition import Model
+    from contfric.models.definition import Model as Model
     from contfric.models.library import find
 
     if isinstance(model, Model):
@@ -74,4 +74,4 @@ def load_model(model: ModelSource) -> Model:
 
 
 # the command line asks for the name of the default model and for nothing else
-__getattr__ = lazily(__name__, {"definition": "Model"})[1]
+__getattr__ = lazily(__name__)[1]

@@ -33,20 +33,4 @@ if TYPE_CHECKING:
     from contfric.plot.save import save_figure as save_figure
     from contfric.plot.style import ROWS as ROWS
 
-__all__, __getattr__, __dir__ = lazily(
-    __name__,
-    {
-        "basins": "plot_basins",
-        "branch_graph": "plot_branch_graph",
-        "diagram": "plot_branches plot_diagram plot_diagram_row",
-        "ensemble": "plot_ensemble",
-        "graph": "plot_transition_graph",
-        "lyapunov": "plot_lyapunov_map",
-        "orbit": "plot_orbit plot_orbit_in_time plot_orbit_panels",
-        "plane": "plot_curves plot_plane",
-        "response": "plot_sweep",
-        "returns": "plot_release_map plot_returns",
-        "save": "journal new_figure save_figure",
-        "style": "ROWS",
-    },
-)
+__all__, __getattr__, __dir__ = lazily(__name__)

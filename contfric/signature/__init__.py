@@ -26,7 +26,9 @@ from contfric.signature.reduced import (
 )
 
 if TYPE_CHECKING:
-    from contfric.signature.schema import SignatureFile, SignatureLike, load_signature
+    from contfric.signature.schema import SignatureFile as SignatureFile
+    from contfric.signature.schema import SignatureLike as SignatureLike
+    from contfric.signature.schema import load_signature as load_signature
 
 __all__ = [
     "NEVER",
@@ -54,4 +56,4 @@ __all__ = [
     "transition_graph",
 ]
 
-__getattr__ = lazily(__name__, {"schema": "SignatureFile SignatureLike load_signature"})[1]
+__getattr__ = lazily(__name__)[1]

@@ -20,13 +20,4 @@ if TYPE_CHECKING:
     from contfric.study.result import UnwrittenError as UnwrittenError
     from contfric.study.run import run_study as run_study
 
-__all__, __getattr__, __dir__ = lazily(
-    __name__,
-    {
-        "library": "study_names study_path",
-        "plan": "Plan make_plan",
-        "read": "Study read_study",
-        "result": "StudyResult UnwrittenError",
-        "run": "run_study",
-    },
-)
+__all__, __getattr__, __dir__ = lazily(__name__)
