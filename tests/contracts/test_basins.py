@@ -5,8 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -191,11 +190,10 @@ def test_without_excitation() -> None:
         cf.basins(belt, grid, None, {"phase": 0.2})
 
 
-def test_the_same_bits_for_any_number_of_workers(three: cf.Basins) -> None:
+def test_the_same_bits_for_any_tiles_and_without_workers(three: cf.Basins) -> None:
+    """With workers: test_workers.py."""
     for tile in (7, 100):
         assert bits(cf.basins("coulomb", GRID, THREE, tile=tile)) == bits(three)
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        assert bits(cf.basins("coulomb", GRID, THREE, tile=100, executor=pool)) == bits(three)
     with ThreadPoolExecutor(1) as pool:
         pool.shutdown()  # takes nothing: all is computed here
         assert bits(cf.basins("coulomb", GRID, THREE, tile=100, executor=pool)) == bits(three)
