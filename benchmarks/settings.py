@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from full_form import full_form
+
 import contfric as cf
-from contfric.orbit.full_form import full_form
 from contfric.orbit.orbit import Orbit
 
 #: Those of Fig. 5 of the article that the project started from.

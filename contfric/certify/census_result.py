@@ -72,9 +72,9 @@ class CensusCertificate:
     Examples
     --------
     >>> import contfric as cf
-    >>> found = cf.certify_census("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-    >>> found.proved, len(found.orbits)
-    (True, 2)
+    >>> found = cf.certify_census("coulomb", {"Omega": 0.5, "S": 0.8, "S0": 0.9})
+    >>> found.proved, [(one.orbit.name, one.stable) for one in found.orbits]
+    (True, [('2s', True)])
     """
 
     params: dict[str, float]

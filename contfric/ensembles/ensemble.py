@@ -66,7 +66,7 @@ class EnsembleEvent:
         >>> import contfric as cf
         >>> box = {"S": (0.30, 0.34)}
         >>> fixed = {"Omega": 0.5, "S0": 0.4}
-        >>> found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, fixed, samples=48)
+        >>> found = cf.ensemble("coulomb", "Omega", (0.5, 0.55), box, fixed, samples=48)
         >>> found.event("SN 1a").sobol().blocks
         16
         """

@@ -110,10 +110,19 @@ class Zeros:
         rng = np.random.default_rng(seed)
         draws = rng.uniform(-1.0, 1.0, (starts, len(self.scale))) * self.scale
         draws[0] = 0.0
-        for k, start in enumerate(draws):
-            found = self.newton(_WIDTHS[k // 2 % len(_WIDTHS)] * start, damped=k % 2 == 0)
+        for k, draw in enumerate(draws):
+            start = _WIDTHS[k // 2 % len(_WIDTHS)] * draw
+            found = self.newton(start, damped=k % 2 == 0)
             if found is None:
                 continue
             near = np.all(np.abs(found) <= _FAR * self.scale)
             if near or not self.region.domain_of(found, self.p)[1]:
-                yield np.where(np.abs(found) < _NOTHING * self.scale, 0.0, found)
+                y = np.where(np.abs(found) < _NOTHING * self.scale, 0.0, found)
+                if self._falls(start, y):
+                    yield y
+
+    def _falls(self, start: FloatArray, y: FloatArray) -> bool:
+        """Tell a zero from a pole, where steps are short as well if other rows lead to it."""
+        fields = self.region.fields
+        before, after = (np.linalg.norm(fields.value(at, self.p) / self.scale) for at in (start, y))
+        return bool(after <= before and np.all(np.isfinite(fields.jacobian(y, self.p))))

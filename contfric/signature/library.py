@@ -15,9 +15,9 @@ from contfric.base.resources import bundled_dir
 from contfric.base.yaml_lines import read_yaml
 from contfric.errors import NotationError, ParameterError, did_you_mean, shown
 from contfric.models import Model
+from contfric.models.paths import SUFFIXES
 
 ENTRY_POINTS = "contfric.signatures"
-SUFFIXES = (".yaml", ".yml")
 
 
 def signature_names(model: str | Model | None = None) -> list[str]:

@@ -12,8 +12,8 @@ from contfric.base.yaml_lines import LocatedYaml, read_yaml
 from contfric.base.yaml_schema import SchemaPart, Truth, validated
 from contfric.errors import NotationError, ParameterError, did_you_mean
 from contfric.models import Model, load_model
-from contfric.models.paths import is_path, relative_model
-from contfric.signature.library import SUFFIXES, signature_path
+from contfric.models.paths import is_path, relative_name
+from contfric.signature.library import signature_path
 from contfric.signature.notation import Signature, split_segments, walk_fault
 
 SignatureLike: TypeAlias = str | Path | Signature
@@ -69,7 +69,7 @@ def load_signature(source: SignatureLike, model: str | Model | None = None) -> S
         raise NotationError(
             f"a signature is a name, a path or a Signature, got {type(source).__name__}"
         )
-    path = Path(source) if _is_path(source) else signature_path(str(source), model)
+    path = Path(source) if is_path(source) else signature_path(str(source), model)
     return read_signature(path, model)
 
 
@@ -92,11 +92,6 @@ def read_signature(path: Path, model: str | Model | None = None) -> Signature:
     except NotationError as error:
         # all else has been checked: what is left is that the walk cannot be symmetric
         located.fail(("symmetric",), str(error))
-
-
-def _is_path(source: str | Path) -> bool:
-    text = str(source)
-    return isinstance(source, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text
 
 
 def _alike(declared: Model, model: str | Model | None) -> bool:
@@ -122,7 +117,7 @@ def _owner(located: LocatedYaml, name: str, model: str | Model | None) -> Model:
     wanted = model.name if isinstance(model, Model) else model
     try:
         # a path is meant from the folder of the signature's file
-        found = load_model(relative_model(name, located.path)) if is_path(name) else None
+        found = load_model(relative_name(name, located.path)) if is_path(name) else None
         declared = found.name if found else name
         if wanted not in (None, declared) and not _alike(found or load_model(name), model):
             located.fail(("model",), f"the signature is of model '{declared}', not of '{wanted}'")

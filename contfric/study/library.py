@@ -7,8 +7,7 @@ from pathlib import Path
 
 from contfric.base.resources import bundled_dir
 from contfric.errors import StudyError, did_you_mean, shown
-
-SUFFIXES = (".yaml", ".yml")
+from contfric.models.paths import SUFFIXES, is_path
 
 
 def study_names() -> list[str]:
@@ -43,9 +42,9 @@ def study_path(source: str | Path) -> Path:
     given: object = source  # whatever the user gave
     if not isinstance(given, (str, Path)) or not str(given).strip() or "\0" in str(given):
         raise StudyError(f"a study is a path or the name of a bundled one, got {shown(given)}")
-    text = str(source)
-    if isinstance(source, Path) or text.endswith(SUFFIXES) or "/" in text or "\\" in text:
+    if is_path(source):
         return _file(Path(source))
+    text = str(source)
     for suffix in SUFFIXES:
         path = bundled_dir("studies") / f"{text}{suffix}"
         if path.is_file():

@@ -11,13 +11,13 @@ from contfric.base.yaml_schema import validated
 from contfric.errors import NotationError, ParameterError, ResultFileError, StudyError, did_you_mean
 from contfric.models import load_model
 from contfric.models.definition import Model
-from contfric.models.paths import relative_model
+from contfric.models.paths import relative_name
 from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.registry import number_quantity, quantity_names
 from contfric.signature import Signature, load_signature
 from contfric.study.drawings import Drawing, drawings_of
-from contfric.study.library import SUFFIXES, study_path
+from contfric.study.library import study_path
 from contfric.study.schema import SCHEMA, StudyFile
 from contfric.study.tasks.task import Asked
 from contfric.study.wanted import Row, Want
@@ -121,7 +121,7 @@ def _validated(located: LocatedYaml) -> StudyFile:
 
 def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     try:
-        model = load_model(relative_model(content.model, located.path))
+        model = load_model(relative_name(content.model, located.path))
     except ParameterError as error:
         located.fail(("model",), str(error))
     whole, (model, content) = content, _tied(located, content, model)
@@ -189,9 +189,7 @@ def _signature(located: LocatedYaml, content: StudyFile, model: Model) -> Signat
     if source is None:
         return None
     try:
-        if source.endswith(SUFFIXES) or "/" in source:
-            return load_signature(located.path.parent / source, model)
-        return load_signature(source, model)
+        return load_signature(relative_name(source, located.path), model)
     except NotationError as error:
         located.fail(("start", "signature"), str(error))
 

@@ -44,8 +44,8 @@ def found(orbit: cf.Orbit, diagram: cf.Diagram, tmp_path_factory: Any) -> dict[s
     starts = {"x": np.linspace(-1, 1, 3), "v": np.linspace(-1, 1, 3)}
     grid = {"Omega": [0.5], "S": [0.3, 0.32]}
     data = [cf.Measured("x_max", 1.424, 0.005, {"Omega": 0.5})]
-    rests = cf.find_equilibria("belt")
-    rest = cf.explore_equilibria("belt", "vb", (0.1, 1.0))
+    rests = cf.find_equilibria("belt", starts=8)
+    rest = cf.explore_equilibria("belt", "vb", (0.1, 1.0), starts=8)
     folder = tmp_path_factory.mktemp("study") / "out"
     scene = folder.with_name("scene.yaml")
     scene.write_text("model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n", encoding="utf-8")

@@ -130,3 +130,18 @@ def test_boundary_equilibria_are_what_their_product_says(seed: int) -> None:
         ]
     # the equilibrium of f+ is admissible at +step: its partner there too (fold), or at -step (persistence)
     assert len(beside[step]) == (product < 0) and len(beside[-step]) == (product > 0)
+
+
+def test_a_pole_is_no_zero() -> None:
+    """The friction law of one mode, gone on with, has its pole where the equilibrium would be."""
+    poles = 0
+    for seed in range(6):
+        delta = float(np.random.default_rng(seed).uniform(0.5, 8.0))
+        params = {"delta": delta, "vb": 1.0 / delta}
+        poles += 1.0 + delta * (0.0 - params["vb"]) == 0.0
+        found = cf.find_equilibria("belt", params, starts=12)
+        # at rest under the friction of a belt that is faster, and nothing else within reach
+        (point,) = found.points
+        assert point.location.name == "ADMISSIBLE"
+        assert point.state == pytest.approx([1.0 / (1.0 + delta * params["vb"]), 0.0], abs=1e-12)
+    assert poles > 3

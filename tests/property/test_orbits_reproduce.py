@@ -9,15 +9,20 @@ are left out.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.full_form import full_form
 from contfric.signature.cyclic import rotated
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+
+from full_form import full_form
 
 DIAGRAMS = {
     "fig05": ({"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
