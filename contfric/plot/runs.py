@@ -114,7 +114,7 @@ def _event_vertex(
 ) -> _Vertex:
     arc = _position(branch, event)
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
-    known = np.isfinite(near)
+    known = np.isfinite(near) | (len(near) == 1)
     y = near.copy()
     y[known] = aligned(counted(branch, event, quantity(event.orbit, row), near), near[known])
     x = event.params[branch.parameter]
@@ -163,11 +163,13 @@ def threaded(rows: FloatArray) -> FloatArray:
     array([[1. , 5. , nan, nan],
            [1.1, 5.1, 2. , 2.1]])
     """
+    if rows.shape[1] == 1:
+        return rows
     if np.all(np.isfinite(rows)):
         turned = [np.roll(rows[:-1], k, axis=1) for k in range(rows.shape[1])]
         apart = np.array([np.sum((rows[1:] - other) ** 2, axis=1) for other in turned])
         if np.all(apart[0] <= apart.min(axis=0)):
-            return rows  # most of them; and all lists of one number
+            return rows  # most of them
     lists = [row[np.isfinite(row)] for row in rows]
     columns: list[list[int]] = []
     count, last, own = 0, np.empty(0), list[int]()
@@ -177,7 +179,7 @@ def threaded(rows: FloatArray) -> FloatArray:
         count += len(new)
         columns.append(own)
         last = values
-    found = np.full((len(rows), count), np.nan)
+    found = np.full((len(rows), max(count, 1)), np.nan)
     for k, (values, own) in enumerate(zip(lists, columns, strict=True)):
         found[k, own] = values
     return found
