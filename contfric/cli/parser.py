@@ -51,7 +51,13 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     first = next((a for a in arguments if not a.startswith("-")), None)
     if first is not None and first not in _COMMANDS:
         raise UsageError(f"unknown command '{first}'{did_you_mean(first, _COMMANDS)}")
-    return _parser().parse_args(_joined(arguments))
+    options, unknown = _parser().parse_known_args(_joined(arguments))
+    if (
+        unknown
+    ):  # argparse would point to the help of the program, which has no options of a command
+        of = f"contfric {first}" if first is not None else "contfric"
+        raise UsageError(f"unrecognized arguments: {' '.join(unknown)} (see: {of} --help)")
+    return options
 
 
 def _joined(arguments: Sequence[str]) -> list[str]:

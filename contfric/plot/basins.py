@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contfric.plot.cells import draw_cells
@@ -19,6 +21,14 @@ if TYPE_CHECKING:
 
 #: What converges to no orbit: from black (chaos) to white.
 _OTHERS = ("#222222", "#8A8A8A", "#C8C8C8", "#E6E6E6")
+#: How an orbit is marked.
+_ORBIT: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "o",
+    "color": "white",
+    "markeredgecolor": "black",
+    "markersize": 5,
+}
 
 
 def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
@@ -51,7 +61,10 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     draw_cells(ax, found.axes, number, cmap=shades, vmin=-0.5, vmax=most)
     _draw_orbits(ax, found, first, second)
     names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
-    handles = [Patch(color=c, label=n) for c, n in zip(_shown(found, colours), names, strict=False)]
+    shown = zip(_shown(found, colours), names, strict=False)
+    handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
+    if found.orbits and not found.model.autonomous:
+        handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
     ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     name_axes(ax, f"${first}$", f"${second}$")
     return ax
@@ -73,7 +86,7 @@ def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:
         turn = orbit.period / orbit.periods
         times = (found.at["phase"] + np.arange(orbit.periods)) * turn
         states = np.array([orbit.state(float(t)) for t in times])
-        ax.plot(states[:, i], states[:, j], "o", color="white", mec="black", ms=5)
+        ax.plot(states[:, i], states[:, j], **_ORBIT)
 
 
 def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
 from contfric.plot.names import event_label
-from contfric.plot.runs import quantity
+from contfric.plot.runs import counted, quantity
 from contfric.plot.style import MARKERS, OTHER_MARKER, sized
 
 if TYPE_CHECKING:
@@ -61,7 +61,12 @@ def marks_of(
         x = event.params[parameter]
         there = [b for b in regular if _coincide(b, event, parameter)]
         images = [*there, *(b for b in bridges if _coincide(b, event, parameter))]
-        y = np.concatenate([quantity(b.orbit, row) for b in (event, *images)])
+        y = np.concatenate(
+            [
+                *(quantity(b.orbit, row) for b in (event, *images)),
+                *(_at_end(branch, b, row) for b in (event, *images) for branch in branches),
+            ]
+        )
         y = y[np.isfinite(y)]
         if not len(y):
             continue
@@ -70,6 +75,14 @@ def marks_of(
             only = bool(images) and not there
             found.append(Mark(event.kind, label, x, _distinct(y), only, event.meaning))
     return found
+
+
+def _at_end(branch: Branch, event: Bifurcation, row: QuantityLike) -> FloatArray:
+    """Return a quantity as a branch counts it that ends at an event with a shorter period; else nothing."""
+    for side, end in enumerate(branch.ends):
+        if end.bifurcation is event and branch.system.periods > event.orbit.periods:
+            return counted(branch, event, quantity(event.orbit, row), quantity(branch, row)[-side])
+    return np.empty(0)
 
 
 def _coincide(a: Bifurcation, b: Bifurcation, parameter: str) -> bool:

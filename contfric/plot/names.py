@@ -13,6 +13,9 @@ _GREEK = frozenset(
     )
 )
 
+#: Most characters of a line of parameters: what stands above the narrowest figure of a study, 6.4 inches.
+_LINE = 80
+
 
 def parameter_label(name: str) -> str:
     r"""Return the name of a parameter as mathematics.
@@ -69,8 +72,23 @@ def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> 
 
 
 def fixed_text(fixed: Mapping[str, float]) -> str:
-    """Return parameters and their values as a title; those that are 0 are left out."""
-    return ", ".join(f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items() if v != 0.0)
+    r"""Return parameters and their values as a title, in lines that fit; those that are 0 are left out.
+
+    Examples
+    --------
+    >>> fixed_text({"S": 0.32, "S0": 0.4, "h": 0.0})
+    '$S$ = 0.32, $S_{0}$ = 0.4'
+    >>> fixed_text({f"number{k}": k for k in range(1, 12)}).count("\n")
+    2
+    """
+    lines = [""]
+    for part in (f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items() if v != 0.0):
+        longer = f"{lines[-1]}, {part}" if lines[-1] else part
+        if len(re.sub(r"[${}\\]", "", longer)) <= _LINE:
+            lines[-1] = longer
+        else:
+            lines.append(part)
+    return ",\n".join(lines)
 
 
 def surface_label(name: str) -> str:

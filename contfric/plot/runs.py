@@ -76,7 +76,7 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
 
 def _vertices(branch: Branch, row: QuantityLike) -> list[_Vertex]:
     """Return points and located events in the order of the branch."""
-    columns = quantity(branch, row)
+    columns = threaded(quantity(branch, row))
     tolerance = _SAME * max(float(np.ptp(branch.arc)), 1e-300)
     events = [_event_vertex(branch, b, columns, row) for b in branch.bifurcations]
     points = list(_points(branch, columns))
@@ -114,7 +114,9 @@ def _event_vertex(
 ) -> _Vertex:
     arc = _position(branch, event)
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
-    y = aligned(quantity(event.orbit, row), near)
+    known = np.isfinite(near) | (len(near) == 1)
+    y = near.copy()
+    y[known] = aligned(counted(branch, event, quantity(event.orbit, row), near), near[known])
     x = event.params[branch.parameter]
     sides = event.stable_before, event.stable_after
     if event.kind.value != "SN" and _falls(branch, arc):  # told upward, but drawn along the branch
@@ -134,6 +136,76 @@ def _position(branch: Branch, event: Bifurcation) -> float:
         if end.bifurcation is event:
             return float(branch.arc[-side])
     return event.position
+
+
+def counted(branch: Branch, event: Bifurcation, values: FloatArray, near: FloatArray) -> FloatArray:
+    """Return a quantity of an event's orbit as a branch counts it, which has its value there near by.
+
+    An orbit that doubles its period is the event's orbit, passed twice: an integral over it, or its period,
+    is twice that of the event's orbit, and a mean is the same.
+    """
+    cycles = branch.system.periods / event.orbit.periods
+    if len(values) != 1 or len(near) != 1 or not np.isfinite(near[0]) or not cycles > 1.0:
+        return values
+    several = cycles * values
+    return several if abs(several[0] - near[0]) < abs(values[0] - near[0]) else values
+
+
+def threaded(rows: FloatArray) -> FloatArray:
+    """Return lists of numbers, one in each row, with a column for each number that goes on from row to row.
+
+    Lists are cyclic, as stops in the order of an orbit, and end with nan. Where a list is longer by two than
+    the one before, or shorter, two neighbours appear or vanish; any other change begins with new columns.
+
+    Examples
+    --------
+    >>> threaded(np.array([[1.0, 5.0, np.nan, np.nan], [5.1, 2.0, 2.1, 1.1]]))
+    array([[1. , 5. , nan, nan],
+           [1.1, 5.1, 2. , 2.1]])
+    """
+    if rows.shape[1] == 1:
+        return rows
+    if np.all(np.isfinite(rows)):
+        turned = [np.roll(rows[:-1], k, axis=1) for k in range(rows.shape[1])]
+        apart = np.array([np.sum((rows[1:] - other) ** 2, axis=1) for other in turned])
+        if np.all(apart[0] <= apart.min(axis=0)):
+            return rows  # most of them
+    lists = [row[np.isfinite(row)] for row in rows]
+    columns: list[list[int]] = []
+    count, last, own = 0, np.empty(0), list[int]()
+    for values in lists:
+        kept, new = _followed(last, values)
+        own = [own[k] if k >= 0 else count + new.index(i) for i, k in enumerate(kept)]
+        count += len(new)
+        columns.append(own)
+        last = values
+    found = np.full((len(rows), max(count, 1)), np.nan)
+    for k, (values, own) in enumerate(zip(lists, columns, strict=True)):
+        found[k, own] = values
+    return found
+
+
+def _followed(last: FloatArray, values: FloatArray) -> tuple[list[int], list[int]]:
+    """Return which of the last list each number of a cyclic one goes on from; -1 if none, and those."""
+    n, m = len(last), len(values)
+    every = list(range(m))
+    if abs(n - m) not in (0, 2) or not n or not m:
+        return [-1] * m, every
+    more, fewer = (last, values) if n > m else (values, last)
+    tries = []
+    for turn in range(
+        len(more)
+    ):  # the list that is longer, from each of its numbers, without its first two
+        own = [(turn + i) % len(more) for i in range(len(more))][abs(n - m) :]
+        for k in range(len(fewer) if n != m else 1):
+            other = [(k + i) % len(fewer) for i in range(len(fewer))]
+            apart = float(np.sum((more[own] - fewer[other]) ** 2))
+            tries.append((apart, own, other))
+    _, own, other = min(tries, key=lambda found: found[0])
+    pairs = zip(other, own, strict=True) if n > m else zip(own, other, strict=True)
+    came = dict(pairs)
+    kept = [came.get(i, -1) for i in every]
+    return kept, [i for i in every if kept[i] < 0]
 
 
 def aligned(values: FloatArray, reference: FloatArray) -> FloatArray:

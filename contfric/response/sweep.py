@@ -162,6 +162,11 @@ class Sweep(Tabled):
         if row not in ROWS:
             raise ParameterError(f"a row is one of {', '.join(ROWS)}, got {shown(row)}")
         if row != "stops" and self.section != STOPS:
+            if not self.model.stop_surface:
+                raise ParameterError(
+                    f"'{row}' is known at the stops, and '{self.model.name}' names no surface v = 0 "
+                    "for them: draw the sweep by itself, sweep.plot()"
+                )
             raise ParameterError(
                 f"'{row}' is known at the stops: sweep(..., section='stops'), or draw row='stops'"
             )

@@ -245,7 +245,8 @@ def test_saved_table_and_drawn(three: cf.Basins, tmp_path: Path) -> None:
     assert (table["orbit"].to_numpy().reshape(three.shape) == three.labels).all()
     assert list(table["x"][:2]) == [-2.0, -2.0] and table["v"][1] == GRID["v"][1]
     ax = three.plot()
-    assert len(ax.get_legend().get_texts()) == 3 and len(ax.lines) == 3
+    named = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert len(named) == 4 and named[3] == "the orbits, once a period" and len(ax.lines) == 3
 
 
 @pytest.mark.parametrize(

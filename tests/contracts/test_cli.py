@@ -146,7 +146,11 @@ def test_bad_study(study, tmp_path, capsys, monkeypatch, name, text, message) ->
         (["explain", "none.yaml"], "there is no file none.yaml"),
         (["rnu", "fig05"], "unknown command 'rnu'; did you mean 'run'"),
         (["run"], "required: STUDY (see: contfric run --help)"),
-        (["run", "fig05", "--ouf", "x"], "unrecognized arguments: --ouf"),
+        (
+            ["run", "fig05", "--ouf", "x"],
+            "unrecognized arguments: --ouf x (see: contfric run --help)",
+        ),
+        (["census", "--model", "belt"], "arguments: --model (see: contfric census --help)"),
         (["graph", "--model", "colomb"], "unknown model 'colomb'; did you mean 'coulomb'"),
         (["graph", "--out", "a.jpg"], "cannot draw to 'a.jpg': its ending is not one of .png"),
         (["signatures", "show", "1s"], "unknown signature '1s'"),

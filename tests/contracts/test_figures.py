@@ -47,7 +47,7 @@ from contfric.plot.measured import _MEASURE, _UPDATE
 from contfric.plot.names import event_label, parameter_label, surface_label
 from contfric.plot.orbit import _columns
 from contfric.plot.pieces import level, observe, pieces_of
-from contfric.plot.runs import aligned, stability_runs
+from contfric.plot.runs import aligned, stability_runs, threaded
 from contfric.plot.style import (
     BRIDGE_COLOUR,
     BRIDGE_NAME,
@@ -113,7 +113,7 @@ def event(position: float, x: float, y: float, before: bool | None, after: bool 
     return SimpleNamespace(
         kind=SimpleNamespace(value="SN", meaning="fold"),
         params={"p": x},
-        orbit=SimpleNamespace(x_max=y, stops=np.array([y, -y])),
+        orbit=SimpleNamespace(x_max=y, stops=np.array([y, -y]), periods=1),
         label="SN_1a",
         meaning="fold",
         position=position,
@@ -129,6 +129,7 @@ def fold(stable: list[bool] | None, events: list[Any]) -> Any:
     return SimpleNamespace(
         parameter="p",
         name="1a",
+        system=SimpleNamespace(periods=1),
         mirrored=False,
         bridge=False,
         values=1.0 - s**2,
@@ -724,3 +725,45 @@ def test_an_axis_measures_its_ticks_once_where_it_is(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(Axis, _MEASURE, lambda a, *rest: measured.append(a) or plain(a, *rest))
     lay_out(axes[0])
     assert 0 < len(measured) <= 3 * 6
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_lines_of_stops_go_on_where_two_of_them_appear_or_vanish(seed: int) -> None:
+    """Smooth curves of which two neighbours meet, listed in the order of the orbit, from any of them on.
+
+    Each line of the drawing stays on one curve: it was drawn by its place in the list, across all of them.
+    """
+    rng = np.random.default_rng(seed)
+    count, across = int(rng.integers(2, 6)), np.linspace(0.0, 1.0, 400)
+    curves = [2.0 * k + 0.3 * np.sin(rng.uniform(1, 4) * across + k) for k in range(count)]
+    fold = rng.uniform(0.2, 0.8)
+    half = np.sqrt(np.maximum(fold - across, 0.0))
+    at = int(rng.integers(0, count + 1))
+    pair = [2.0 * count + 2.0 + half, 2.0 * count + 2.0 - half]
+    ordered = [*curves[:at], *pair, *curves[at:]]
+    rows, first = np.full((len(across), count + 2), np.nan), 0
+    for k, x in enumerate(across):
+        listed = [c[k] for c in (ordered if x < fold else curves)]
+        first = int(rng.integers(0, len(listed))) if k % 50 == 0 else first
+        rows[k, : len(listed)] = np.roll(listed, first)
+    found = threaded(rows)
+    assert found.shape == (len(across), count + 2)
+    steps = np.abs(np.diff(found, axis=0))
+    assert np.nanmax(steps) < 0.1  # a root moves by sqrt(1/400)
+    np.testing.assert_array_equal(np.sort(found, axis=1), np.sort(rows, axis=1))
+
+
+def test_an_integral_over_a_doubled_orbit_is_counted_twice_at_its_doubling() -> None:
+    """The orbit of the event has half the period of the branch there: the line fell to half its value."""
+    start = cf.find_orbit("bouncing-ball", {"a": 1.2, "e": 0.5}, state=[5.0, 2.0])
+    diagram = cf.explore(start, "a", (1.1, 1.6), max_branches=4)
+    once, twice = diagram.branches
+    (doubling,) = diagram.of_kind("PD")
+    assert (once.system.periods, twice.system.periods) == (1, 2)
+    for row, cycles in (("period", 2.0), ("integral(v**2)", 2.0), ("mean(v**2)", 1.0)):
+        own = float(doubling.orbit.quantity(row))
+        values = np.concatenate([run.y[:, 0] for run in stability_runs(twice, row)])
+        assert np.min(np.abs(values - cycles * own)) < 1e-9 * own
+        assert np.max(np.abs(np.diff(values))) < 0.1 * own
+        (mark,) = marks_of(diagram.bifurcations, diagram.branches, row, "a")
+        np.testing.assert_allclose(mark.y, [own, 2.0 * own] if cycles == 2.0 else [own], rtol=1e-6)

@@ -202,6 +202,9 @@ def test_every_model_has_a_section_where_none_is_named(model: str, section: str 
     assert swept.section == section
     assert len(swept.up) > 0
     np.testing.assert_array_equal(swept.up.states, named.up.states)
+    if section != "stops":
+        with pytest.raises(cf.ParameterError, match="names no surface v = 0"):
+            list(swept.quantity("x_max"))
 
 
 @pytest.mark.parametrize(
