@@ -248,7 +248,7 @@ class TransitionMaps(SectionMaps):
 
     def _led_away(self, asked: Mapping[str, int], reset: Reset, before: Domain) -> list[Domain]:
         """Return the domains of modes that a reset names next to surfaces that motion slid on before."""
-        slid = {s for s, side in asked.items() if side == 0}
+        slid = {s for s, side in asked.items() if side == 0 and s not in reset.lands}
         named = {
             lead.mode for lead in reset.leads if not lead.after or before.own_mode in lead.after
         }
