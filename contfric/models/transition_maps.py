@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.parts import led
+from contfric.models.parts import across, led
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
@@ -226,6 +226,9 @@ class TransitionMaps(SectionMaps):
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
         behind = led(behind, reset.leads, domain.own_mode)
+        if reset.stays:
+            labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
+            behind += across(behind, reset.surface, labels, self.domains)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(dict.fromkeys(d.name for d in (*behind, *resting)))
