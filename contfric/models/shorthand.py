@@ -197,8 +197,9 @@ def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
             }
     if not resets:
         return data, {}
-    named = named_parts(resets, parts) if parts else resets
-    return {**data, "modes": modes, "resets": named}, parts
+    if parts:
+        resets = named_parts(resets, parts)
+    return {**data, "modes": modes, "resets": resets}, parts
 
 
 def _going_on(data: dict[str, Any], before: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
