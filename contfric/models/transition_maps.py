@@ -226,7 +226,7 @@ class TransitionMaps(SectionMaps):
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
         behind = led(behind, reset.leads, domain.own_mode)
-        if reset.stays:
+        if reset.stays and not reset.changes:  # it only says the mode
             labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
             behind += across(behind, reset.surface, labels, self.domains)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
