@@ -99,7 +99,7 @@ class Landing:
         images: Sequence[tuple[Domain, float, list[float]]],
     ) -> int:
         own = surface == self.surface
-        named = {lead.mode for lead in self.leads}
+        named = {lead.mode for lead in self.leads if lead.mode not in lead.after}
         if named and {d.signs[surface] for d in self.domains if d.own_mode in named} == {0}:
             return 0  # it leads into motion on that surface
         verdicts, asked, passed = Counter[int](), Counter[int](), True

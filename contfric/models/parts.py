@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -126,6 +126,21 @@ def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Do
             or not (d.signs in kept or any(_is_next_to(d.signs, signs) for signs in beside))
         ]
     return found
+
+
+def across(
+    behind: Sequence[Domain], surface: str, modes: Set[str], domains: Sequence[Domain]
+) -> list[Domain]:
+    """Return the domains on the other side of a surface that an image lies on, in modes that hold on both.
+
+    The surface is a label there: motion may go on to either side.
+    """
+    turned = [
+        (d.own_mode, {**d.signs, surface: -d.signs[surface]})
+        for d in behind
+        if d.own_mode in modes and d.signs[surface]
+    ]
+    return [d for d in domains if d not in behind and (d.own_mode, d.signs) in turned]
 
 
 def _is_next_to(sliding: Mapping[str, int], signs: Mapping[str, int]) -> bool:

@@ -66,7 +66,7 @@ def named_parts(
             inside = {**sides, FROM: named(sides[FROM])} if asked else sides
             found += [{part: inside} if inside else part for part in parts.get(mode, (mode,))]
         goes_on = [{part: {FROM: [*own]}} for own in parts.values() for part in own]
-        return [*found, *goes_on] if isinstance(given, Mapping) else found
+        return [*found, *goes_on]
 
     by_key = {TO: led_into, FROM: named}
     return {

@@ -18,7 +18,7 @@ from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
 from contfric.models.entries import EntryError, Part, as_identifier, listed, mapping_in
 from contfric.models.grammar import PERIOD, RESERVED
-from contfric.models.reset_modes import FROM, named_parts
+from contfric.models.reset_modes import FROM, TO, named_parts
 from contfric.models.tied import with_ties_put_in
 from contfric.models.units import in_units
 
@@ -40,9 +40,9 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
         return read(data)  # which says what is wrong, and where
     if not data.get("surfaces") and "modes" not in data and "field" in data:
         data = {**data, **_smooth(data)}
-    data = _divided_by_resets(_with_observables(_with_period(with_ties_put_in(data))))
+    data, parts = _divided_by_resets(_with_observables(_with_period(with_ties_put_in(data))))
     walls, data = _chattering(data)
-    surfaces, plain = _derived_sliding(with_angles(with_clock(data)))
+    surfaces, plain = _derived_sliding(_going_on(with_angles(with_clock(data)), data, parts))
     plain = in_units(plain, read)
     found = read(plain)
     if surfaces:
@@ -89,6 +89,8 @@ def _divided(
     return divided
 
 
+#: The parts of modes that resets divide.
+Parts = Mapping[str, tuple[str, ...]]
 #: Parts of a model that are mappings, and those of them whose entries are mappings.
 _MAPPINGS = (
     "parameters",
@@ -155,8 +157,8 @@ def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     return {**data, "surfaces": named, "observables": observables} if observables else data
 
 
-def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a model in which a reset acts in modes that lie on both sides of its surface.
+def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
+    """Return a model in which a reset acts in modes that lie on both sides of its surface, and their parts.
 
     A clock is struck as its balance passes the middle on the way up: ``from: [up]`` at ``x = 0``. Each mode
     that a reset names, and that says no side of its surface, is two: ``up-`` below it and ``up+`` above; four
@@ -183,14 +185,32 @@ def _divided_by_resets(data: dict[str, Any]) -> dict[str, Any]:
         signs = [s for s in product("-+", repeat=len(between)) if _is_somewhere(s, between, data)]
         own = [f"{name}{''.join(sides)}" for sides in signs]
         if not modes.keys() & {*own}:
-            whole, parts[name] = modes.pop(name), tuple(own)
+            whole, parts[name] = modes[name], tuple(own)
             inside = [
                 {**mapping_in(whole, "in"), **dict(zip(between, s, strict=True))} for s in signs
             ]
-            modes |= {n: {**whole, "in": sides} for n, sides in zip(own, inside, strict=True)}
+            divided = {n: {**whole, "in": sides} for n, sides in zip(own, inside, strict=True)}
+            modes = {  # in their order: of modes that overlap a start is in the first
+                n: m
+                for old, entry in modes.items()
+                for n, m in (divided if old == name else {old: entry}).items()
+            }
     if not resets:
-        return data
-    return {**data, "modes": modes, "resets": named_parts(resets, parts) if parts else resets}
+        return data, {}
+    if parts:
+        resets = named_parts(resets, parts)
+    return {**data, "modes": modes, "resets": resets}, parts
+
+
+def _going_on(data: dict[str, Any], before: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
+    """Return a model in which what is divided goes on, in any of its parts, where a turn or a period begins.
+
+    Other modes may hold there, too, if they overlap; these resets are none that the user wrote.
+    """
+    own, resets = mapping_in(before, "resets"), mapping_in(data, "resets")
+    goes_on = [{part: {FROM: [*all_]}} for all_ in parts.values() for part in all_]
+    fresh = {s: {**entry, TO: goes_on} for s, entry in resets.items() if s not in own and goes_on}
+    return {**data, "resets": {**resets, **fresh}} if fresh else data
 
 
 def _is_somewhere(sides: Sequence[str], surfaces: Sequence[str], data: Mapping[str, Any]) -> bool:

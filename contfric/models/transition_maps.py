@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.parts import led
+from contfric.models.parts import across, led
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
@@ -226,6 +226,9 @@ class TransitionMaps(SectionMaps):
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
         behind = led(behind, reset.leads, domain.own_mode)
+        if reset.stays and not reset.changes:  # it only says the mode
+            labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
+            behind += across(behind, reset.surface, labels, self.domains)
         chatter = self.chatter_at.get((domain.mode, reset.surface))
         resting = self.domains_of(chatter.mode) if chatter else ()
         return tuple(dict.fromkeys(d.name for d in (*behind, *resting)))
@@ -248,7 +251,7 @@ class TransitionMaps(SectionMaps):
 
     def _led_away(self, asked: Mapping[str, int], reset: Reset, before: Domain) -> list[Domain]:
         """Return the domains of modes that a reset names next to surfaces that motion slid on before."""
-        slid = {s for s, side in asked.items() if side == 0}
+        slid = {s for s, side in asked.items() if side == 0 and s not in reset.lands}
         named = {
             lead.mode for lead in reset.leads if not lead.after or before.own_mode in lead.after
         }

@@ -42,7 +42,9 @@ def start_of(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
     name = (
-        domain or model.domain_of(signs, t, y, vector) or _side_of_rates(model, t, y, vector, signs)
+        _at_phase(model, domain, signs)
+        or model.domain_of(signs, t, y, vector)
+        or _side_of_rates(model, t, y, vector, signs)
     )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
@@ -52,6 +54,19 @@ def start_of(
         mode = _let_go(model, rest, t, y, vector, signs) or mode
     on = bits_of(model, (k for k in cut_bounds(model)[mode] if signs.get(k, 1) == 0))
     return model.mode_index[mode], on
+
+
+def _at_phase(model: Model, domain: str | None, signs: dict[str, int]) -> str | None:
+    """Return the domain that a user names, on the side of the phase that the time is on.
+
+    A mode that the phase divides has its own name on the first side only.
+    """
+    side = signs.get(model.phase, 0) if domain else 0
+    if domain is None or side == 0 or model.domain_by_name[domain].signs[model.phase] == side:
+        return domain
+    here = {**model.domain_by_name[domain].signs, model.phase: side}
+    mode = model.domain_by_name[domain].mode
+    return next((d.name for d in model.domains if d.mode == mode and d.signs == here), domain)
 
 
 def _let_go(

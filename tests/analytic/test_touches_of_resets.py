@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
-from tests.models.typed import typed
 
 #: A gate that is passed on the way up; what comes down through it is mapped.
 GATE = """

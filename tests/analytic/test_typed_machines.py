@@ -296,3 +296,74 @@ def test_periods_are_those_of_the_clock(tmp_path, Ts: float) -> None:
     assert len(cf.poincare(model, {"Ts": Ts}, [0.1], **how).times) == 8
     swept = cf.sweep(model, "Ts", [Ts, 2 * Ts], both=False, **how).up  # the longest of both periods
     assert max(np.bincount(swept.index)) <= 16
+
+
+#: One phase of a switched reluctance motor: current in a band between two angles, then driven down to zero.
+RELUCTANCE = """
+name: reluctance
+states: [th, i]
+parameters: {w: 50.0, V: 100.0, R: 1.0, L0: 0.05, L1: 0.03, on: -0.6, off: 0.3, I: 5.0, band: 0.5}
+autonomous: true
+angles: [th]
+define: {L: L0 + L1*cos(th), dL: -L1*sin(th)}
+surfaces:
+  turn_on: {observable: th, level: on}
+  turn_off: {observable: th, level: off}
+  over: {observable: i, level: I}
+  under: {observable: i, level: I - band}
+  none: {observable: i}
+modes:
+  mag: {in: {over: -}, field: {th: w, i: (V - R*i - w*dL*i)/L}}
+  free: {in: {under: +}, field: {th: w, i: (-R*i - w*dL*i)/L}}
+  demag: {in: {none: +}, field: {th: w, i: (-V - R*i - w*dL*i)/L}}
+  idle: {in: {none: 0}, field: {th: w, i: 0}}
+resets:
+  turn_on: {to: mag, from: [idle, demag]}
+  turn_off: {to: demag, from: [mag, free]}
+  over: {to: free, from: [mag]}
+  under: {to: mag, from: [free]}
+  none: {to: idle, from: [demag]}
+spread: {th: 3, i: 5}
+"""
+
+
+@pytest.mark.parametrize("V", [80.0, 120.0])
+def test_a_motor_whose_modes_overlap_and_turn(tmp_path, V: float) -> None:
+    """Its modes are divided by two angles, go on where a turn begins, and 'idle' slides where a reset leads.
+
+    All three were refused. The flux L i obeys a linear equation between events, which scipy finds.
+    """
+    model = typed(tmp_path, RELUCTANCE)
+    assert [mode.name[:-1] for mode in model.modes[::2]] == ["mag", "free", "demag", "idle"]
+    orbit = cf.find_orbit(model, {"V": V}, state=[0.0, 1.0])
+    assert orbit.period == pytest.approx(2 * np.pi / 50.0, rel=1e-12)
+
+    def current(volts, t, i, angle, level):
+        """Return (time, current) where it takes a level, or the angle is past; the angle is w t."""
+
+        def rate(t, y):
+            L, dL = 0.05 + 0.03 * np.cos(50 * t), -0.03 * np.sin(50 * t)
+            return [(volts - y[0] - 50 * dL * y[0]) / L]
+
+        def met(_, y):
+            return y[0] - level
+
+        met.terminal = True
+        start = [i + (1e-9 if level == i else 0.0)]
+        found = solve_ivp(
+            rate, (t, angle / 50), start, "DOP853", events=met, rtol=1e-12, atol=1e-13
+        )
+        return found.t[-1], found.y[0, -1]
+
+    t, i, volts, events = -0.6 / 50, 0.0, V, []
+    while t < 0.3 / 50:  # in the band
+        t, i = current(volts, t, i, 0.3, 5.0 if volts else 4.5)
+        events.append(t)
+        volts = 0.0 if volts else V
+    events.append(current(-V, t, i, np.pi, 0.0)[0])
+    ours = [
+        float(end[1] / 50)
+        for end, (_, exit_) in zip(orbit.ends, orbit.itinerary, strict=True)
+        if exit_ not in ("turn_on", "th+")
+    ]
+    assert sorted(ours) == pytest.approx(events, abs=1e-10)

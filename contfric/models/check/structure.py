@@ -242,9 +242,9 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     ]
     if not fits:
         return f"{where} is in no domain: {_sides(signs)}. Add a mode that holds there{passes}"
-    for surface in (name for name, side in reset.lands.items() if side != 0):
-        rate = probe.rate(fits[0].own_mode, surface, t, behind)
-        if not fits[0].signs[surface] * rate > 0.0:
+    for surface in (s for s, side in reset.lands.items() if side != 0):
+        rate, mode = probe.rate(fits[0].own_mode, surface, t, behind), fits[0].own_mode
+        if not max(d.signs[surface] * rate for d in fits if d.own_mode == mode) > 0.0:
             observable = model.surface_by_name[surface].observable
             return (
                 f"{where} still runs into the surface '{surface}': a reset must turn the rate of "
