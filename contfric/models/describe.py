@@ -15,6 +15,7 @@ from contfric.models.contact_laws import check_laws, read_laws
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import STRUCTURE, Description, DomainText, ModeText
 from contfric.models.entries import Part, is_number, mapping_in
+from contfric.models.evaluate import check_period
 from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.parts import Chatter
@@ -385,5 +386,6 @@ def _check_expressions(found: Description, names: Names) -> None:
         names.check(("spread", state), width, only_parameters=True)
     if found.period:
         names.check(("period",), found.period, only_parameters=True)
+        check_period(found)
     check_laws(found.laws, names, timed)
     check_quantities(found.quantities, names, timed, [law.name for law in found.laws])

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
 from contfric.models.python_code import Function, function_of
 
@@ -132,6 +133,22 @@ def floats(description: Description) -> Evaluator[float]:
 def defaults(description: Description) -> dict[str, float]:
     """Return the default of every parameter."""
     return {p.name: p.default for p in description.parameters}
+
+
+def check_period(description: Description) -> None:
+    """Refuse a period that is not above 0 at the defaults.
+
+    Raises
+    ------
+    EntryError
+        With the address of the period.
+    """
+    period = floats(description).value(description.period, defaults(description))
+    if not period > 0.0:
+        raise EntryError(
+            ("period",),
+            f"a period is above 0; '{description.period}' is {period:g} at the defaults",
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
     ('q1', 'v1')
     """
     mass, damping, stiffness = (_rows(matrix) for matrix in (mass, damping, stiffness))
-    size = len(stiffness) if coordinates is None else len(coordinates)
+    size = _size(stiffness, mass, damping) if coordinates is None else len(coordinates)
     data: dict[str, Any] = {
         "name": name,
         COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
@@ -73,6 +73,17 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
     except EntryError as error:
         where = " -> ".join(map(str, error.address))
         raise ModelError(f"model '{name}', {where or 'as a whole'}: {error}") from None
+
+
+def _size(*matrices: Any) -> int:
+    """Return the number of coordinates: the rows of the first matrix that has rows."""
+    for matrix in matrices:
+        if isinstance(matrix, (list, tuple)):
+            return len(matrix)
+    raise ModelError(
+        "none of these matrices has rows, so they do not say how many coordinates there are: "
+        "give 'stiffness' as rows, or coordinates=['q1', ...]"
+    )
 
 
 def _rows(matrix: Any) -> Any:

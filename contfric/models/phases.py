@@ -20,7 +20,7 @@ from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
-from contfric.models.regions import engine_order, known_sides
+from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
 from contfric.models.sections import joined_modes
 
@@ -32,9 +32,9 @@ _SAME = 1e-9
 _POINTS = 8
 #: Where in a period: at no time at which solutions start, forces are largest, or simulations end.
 _LATE = 1
-#: The phase doubles the regions of a model: one with more modes, of many contacts, has thousands already, and
-#: a section of its own where no contact acts.
-_MOST_MODES = 16
+#: The phase doubles the regions of a model: many contacts with friction have thousands already. Two friction
+#: contacts and a gap have 98, six gaps 64; with more modes than these regions are not even listed.
+_MOST_REGIONS = 128
 
 
 def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,8 +44,12 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     ----------
     data : with the field of each mode in it
     """
-    listed = not description.structure and len(description.modes) <= _MOST_MODES
-    if not description.period or description.phase or not listed:
+    if (
+        not description.period
+        or description.phase
+        or description.structure
+        or _has_many(description)
+    ):
         return {}
     staying = [mode.name for mode in _staying(description)]
     if not staying:
@@ -88,6 +92,13 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         "resets": named_parts(data.get("resets") or {}, parts),
         KEY: name,
     }
+
+
+def _has_many(description: Description) -> bool:
+    """Tell whether a model has more regions than are doubled."""
+    if len(description.modes) > _MOST_REGIONS:
+        return True
+    return len(domains_of(description, engine_order(description))) > _MOST_REGIONS
 
 
 def _with_parts(laws: Mapping[str, str], parts: Mapping[str, Sequence[str]]) -> dict[str, str]:

@@ -70,7 +70,7 @@ def _joined(key: _Key) -> dict[str, str]:
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     acts = description.acts.items()
     mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
-    going_on = True
+    fields, going_on = _Fields(description), True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
@@ -79,7 +79,7 @@ def _joined(key: _Key) -> dict[str, str]:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
             between = _between(description, domains, places, surfaces, both, (a.name, b.name))
-            if between and _same_field(description, a, b, between):
+            if between and fields.agree(a, b, between):
                 lead = next(name for name in first if name in both)
                 first.update(dict.fromkeys(both, lead))
                 going_on = True
@@ -129,22 +129,40 @@ def _between(
     return found
 
 
-def _same_field(description: Description, a: ModeText, b: ModeText, between: set[str]) -> bool:
-    """Tell whether two modes have one field, as it is on either side of what divides them."""
-    evaluator = floats(description)
-    for params in _parameters(description):
-        sampler = Sampler(evaluator, params)
-        for t, y in sampler.states(_POINTS):
-            for one, other in zip(a.field, b.field, strict=True):
-                here, there = (evaluator.value(text, params, t, y) for text in (one, other))
-                if abs(here - there) > _SAME * (1.0 + abs(here) + abs(there)):
-                    return False
-    texts = (*a.field, *b.field)
-    if a.field == b.field and not _has_kinks(description, texts):
-        return True
-    if any(_jumps(Sampler(evaluator, p), a, s) for p in _parameters(description) for s in between):
-        return False
-    return _same_formulas(description, a.name, b.name)
+class _Fields:
+    """The fields of modes at some states, each evaluated once."""
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        evaluator = floats(description)
+        self.points = [
+            (evaluator, params, t, y)
+            for params in _parameters(description)
+            for t, y in Sampler(evaluator, params).states(_POINTS)
+        ]
+        self.rates: dict[str, list[float]] = {}
+
+    def of(self, mode: ModeText) -> list[float]:
+        """Return the rates of all states along a mode."""
+        if mode.name not in self.rates:
+            self.rates[mode.name] = [
+                evaluator.value(text, params, t, y)
+                for evaluator, params, t, y in self.points
+                for text in mode.field
+            ]
+        return self.rates[mode.name]
+
+    def agree(self, a: ModeText, b: ModeText, between: set[str]) -> bool:
+        """Tell whether two modes have one field, as it is on either side of what divides them."""
+        if a.field == b.field and not _has_kinks(self.description, a.field):
+            return True
+        for here, there in zip(self.of(a), self.of(b), strict=True):
+            if abs(here - there) > _SAME * (1.0 + abs(here) + abs(there)):
+                return False
+        samplers = [Sampler(floats(self.description), p) for p in _parameters(self.description)]
+        if any(_jumps(sampler, a, s) for sampler in samplers for s in between):
+            return False
+        return _same_formulas(self.description, a.name, b.name)
 
 
 def _parameters(description: Description) -> list[dict[str, float]]:

@@ -15,7 +15,7 @@ from contfric.models.contacts import Contact, ContactKind, drift, factor_of, rea
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.matrices import Mass, Texts, folded, is_zero, mass_of, matrix_of, summed, times
 from contfric.models.shared_loads import Setting, SharedLoads
-from contfric.models.structure_names import COORDINATES, check_names, check_states
+from contfric.models.structure_names import COORDINATES, check_known, check_names, check_states
 
 #: Most combinations of states of contacts that are listed, each a mode with regions of its own.
 _MOST_MODES = 243
@@ -72,6 +72,10 @@ class Structure:
         known |= {*mapping_in(top.data, "parameters")}
         for key in ("damping", "stiffness", "force"):
             check_names(top, key, size, known)
+        known |= {"T", *(f"f_{q}" for q in coordinates)}
+        for contact in contacts:
+            for key, text in contact.texts.items():
+                check_known(("contacts", contact.name, key), text, known)
         found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
         found.check()
         check_ranges(contacts, params, mapping_in(top.data, "define"))

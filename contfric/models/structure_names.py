@@ -38,17 +38,27 @@ def check_states(
 def check_names(top: Part, key: str, size: int, known: set[str]) -> None:
     """Look up the names in a matrix or in the forces, each in its row."""
     given = top.data.get(key)
-    rows: list[tuple[str | int, list[str]]] = (
-        [(q, [str(text)]) for q, text in mapping_in(top.data, key).items()]
-        if key == "force"
-        else list(enumerate(matrix_of(key, given, size, "0")))
-    )
-    for row, texts in rows:
+    if key == "force":
+        for name, text in mapping_in(top.data, key).items():
+            check_known((key, name), str(text), known)
+        return
+    for row, texts in enumerate(matrix_of(key, given, size, "0")):
         for text in texts:
-            try:
-                foreign = sorted(names_in(parse(text)) - known)
-            except ModelError as error:
-                raise EntryError((key, row), str(error)) from None
-            if foreign:
-                hint = did_you_mean(foreign[0], sorted(known))
-                raise EntryError((key, row), f"unknown name '{foreign[0]}'{hint}")
+            check_known((key, row), text, known)
+
+
+def check_known(address: tuple[str | int, ...], text: str, known: set[str]) -> None:
+    """Refuse names in an expression that are not known, at its address.
+
+    Raises
+    ------
+    EntryError
+        For the first one.
+    """
+    try:
+        foreign = sorted(names_in(parse(text)) - known)
+    except ModelError as error:
+        raise EntryError(address, str(error)) from None
+    if foreign:
+        hint = did_you_mean(foreign[0], sorted(known))
+        raise EntryError(address, f"unknown name '{foreign[0]}'{hint}")

@@ -190,6 +190,8 @@ def _check_motion(trajectory: Trajectory) -> None:
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
             why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
+            if trajectory.model.composed:
+                why += " (where nothing slips, orbits are found for up to four contacts that share no load)"
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
         says = "; `contfric check` says where no mode follows" if missing else ""
         raise ConvergenceError(

@@ -122,9 +122,7 @@ def tangent_of(
 
 def null_vectors(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the null vectors of the Jacobian at fixed parameters, shape (k, N, m)."""
-    _, size, right = np.linalg.svd(assembled(system, joints, vector))
-    found: FloatArray = right[int(np.sum(size > _NULL * size[0])) :].reshape(-1, *joints.shape)
-    return found
+    return null_rows(assembled(system, joints, vector)).reshape(-1, *joints.shape)
 
 
 def null_space(
@@ -137,10 +135,19 @@ def null_space(
     """
     a, b, c, close = jacobian_blocks(system, joints, vector, (active,))
     full = np.hstack([stacked(a, b, close), c.reshape(-1, 1)])
-    _, size, right = np.linalg.svd(full)
-    rank = int(np.sum(size > _NULL * size[0]))
-    found = right[rank:]
+    found = null_rows(full)
     return found[:, :-1].reshape(len(found), *joints.shape), found[:, -1]
+
+
+def null_rows(matrix: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of the null space of a matrix, rows.
+
+    Equations are scaled to one size before: rates of a stiff structure would make all others look like zeros.
+    """
+    size = np.linalg.norm(matrix, axis=1, keepdims=True)
+    _, singular, right = np.linalg.svd(matrix / np.where(size > _NULL, size, 1.0))
+    found: FloatArray = right[int(np.sum(singular > _NULL * singular[0])) :]
+    return found
 
 
 def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:

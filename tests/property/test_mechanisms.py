@@ -257,6 +257,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"contacts": {}}, "contacts: a structure has at least one contact"),
     ({"stiffness": [["kk", 0.0], [0.0, 1.0]]}, "stiffness -> 0: unknown name 'kk'"),
     ({"force": {"q1": "cos(w*t)"}}, "force -> q1: unknown name 'w'"),
+    ({"contacts": {"a": RUBS | {"kinetic": "mu*S"}}}, "a -> kinetic: unknown name 'mu'"),
+    ({"contacts": {"z": ELEMENT | {"limit": "S/(1 + vv)"}}}, "z -> limit: unknown name 'vv'"),
+    ({"period": "0"}, "period: a period is above 0; '0' is 0 at the defaults"),
+    ({"period": "-2*pi"}, "period: a period is above 0"),
+    ({"mass": 1, "damping": 1, "stiffness": "k", "coordinates": None}, "give 'stiffness' as rows"),
     ({"mass": [[1.0, 0.0], [0.0, float("nan")]]}, "mass -> 1: .* has to be a finite number"),
     (
         {"contacts": {"a": WALL | {"restitution": -0.2}}},
@@ -589,3 +594,31 @@ def test_masses_that_nothing_holds_are_found_where_they_are_symmetric(seed: int)
     assert orbit.symmetric and orbit.admissible and orbit.residual < 1e-12
     branch = cf.continue_orbit(orbit, "F", (0.9, 1.1))
     assert {end.reason.name for end in branch.ends} <= {"RANGE", "CS", "SS", "AS", "GS"}
+
+
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
+def test_a_preloaded_train_of_four_gaps_moves_as_a_linear_one(seed: int) -> None:
+    """All its gaps are closed all the time: one of 16 modes, and no surface is met."""
+    draw = np.random.default_rng(seed)
+    n, w, stiff = 5, float(draw.uniform(0.5, 1.5)), draw.uniform(2.0, 5.0, 4)
+    mass, preload = draw.uniform(0.5, 2.0, n), 50.0
+    chain = np.diag(draw.uniform(1.0, 2.0, n))
+    gaps = {
+        f"g{i + 1}": {"kind": "spring", "gap": f"q{i + 2} - q{i + 1}", "stiffness": float(k)}
+        for i, k in enumerate(stiff)
+    }
+    load = {"q1": f"{preload} + cos(w*t)", "q5": f"-{preload}"}
+    model = cf.Mechanism(
+        mass.tolist(), 0.3, chain, contacts=gaps, force=load, parameters={"w": w}, period="2*pi/w"
+    )
+    orbit = cf.find_orbit(model)
+    closed = chain.copy()
+    for i, k in enumerate(stiff):
+        closed[np.ix_([i, i + 1], [i, i + 1])] += k * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    mean = np.linalg.solve(closed, preload * np.array([1.0, 0, 0, 0, -1.0]))
+    wave = np.linalg.solve(closed - w**2 * np.diag(mass) + 0.3j * w * np.eye(n), np.eye(n)[0])
+    assert np.all(np.diff(mean) + 2.0 * np.abs(wave).max() < 0.0)  # closed all the time
+    for t, *y in orbit.joints:
+        assert y[:n] == pytest.approx(mean + np.real(wave * np.exp(1j * w * t)), abs=1e-9)
+    assert orbit.admissible
+    assert orbit.stable

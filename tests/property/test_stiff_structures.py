@@ -7,6 +7,7 @@ import pytest
 
 import contfric as cf
 from contfric.models.view import FlowView
+from contfric.orbit.linear import null_rows
 
 
 def light_tip(seed: int) -> tuple[cf.Model, np.ndarray, float]:
@@ -80,3 +81,41 @@ def test_converged_orbits_end_on_their_surfaces_whatever_oscillates_within_a_con
             for value in mine[np.abs(mine) > 0.1]:
                 assert np.min(np.abs(other - value)) < 1e-9 * size
     assert short
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_vanishes_in_equations_does_not_depend_on_their_sizes(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    n, nullity = int(draw.integers(4, 30)), int(draw.integers(1, 4))
+    left, _ = np.linalg.qr(draw.normal(size=(n, n)))
+    right, _ = np.linalg.qr(draw.normal(size=(n + 1, n + 1)))
+    singular = np.append(10.0 ** draw.uniform(-3.5, 0.0, n + 1 - nullity), np.zeros(nullity - 1))
+    matrix = left @ np.diag(singular) @ right[:n]
+    scaled = 10.0 ** draw.uniform(-1.0, 5.0, (n, 1)) * matrix
+    found = null_rows(scaled)
+    assert len(found) == nullity
+    assert np.max(np.abs(matrix @ found.T)) < 1e-10
+    assert found @ found.T == pytest.approx(np.eye(nullity), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_branch_of_a_stiff_beam_goes_on_where_its_slide_vanishes() -> None:
+    """Its load has rates of 1e4: they made the events at 3.1842 look like a continuum, and branches end."""
+    roots = np.array([1.875104, 4.694091, 7.854757, 10.995541, 14.137168, 17.27876]) ** 2
+    support = {"kind": "friction", "kinetic": "S", "static": "S0"}
+    support["velocity"] = "2*v1 - 2*v2 + 2*v3 - 2*v4 + 2*v5 - 2*v6"
+    model = cf.Mechanism(
+        np.eye(6),
+        np.diag(0.04 * roots),
+        np.diag(roots**2),
+        contacts={"support": support},
+        force={"q1": "cos(Omega*t)", "q2": "0.5*cos(Omega*t)"},
+        parameters={"Omega": 3.2, "S": 0.3, "S0": 0.35},
+        period="2*pi/Omega",
+        name="stiff-beam",
+    )
+    diagram = cf.explore(cf.find_orbit(model), "Omega", (3.17, 3.21))
+    assert not diagram.loose_ends
+    reached = {round(float(v), 12) for b in diagram.branches for v in (b.values[0], b.values[-1])}
+    assert {3.17, 3.21} <= reached
+    assert not any(end.reason is cf.EndReason.CONTINUUM for b in diagram.branches for end in b.ends)

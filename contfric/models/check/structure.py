@@ -259,7 +259,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
     for mode in model.modes:
         if not mode.sliding or mode.name in model.chatter_by_mode:  # that is derived
             continue
-        if not model.composed:  # limits of the load end every stick of a friction contact
+        if not model.composed:  # else limits of the load end every stick
             _check_left(report, model, mode)
         domain = next(d for d in model.domains if d.own_mode == mode.name)
         surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
@@ -283,11 +283,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
 def _check_left(report: ModelReport, model: Model, mode: Mode) -> None:
     """Warn of a sliding mode that nothing ends: motion would stay in it for ever."""
     own = {d.name for d in model.domains if d.own_mode == mode.name}
-    left = any(
-        source in own and not own.issuperset(targets)
-        for (source, _), targets in model.targets.items()
-    )
-    if not left:
+    if all(source not in own or own.issuperset(to) for (source, _), to in model.targets.items()):
         report.warn(
             Topic.SLIDING,
             f"mode '{mode.name}' is never left: no surface ends it. Add the limits between which it can "
