@@ -15,6 +15,7 @@ from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import point_before
 from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import is_rate_of
+from contfric.continuation.twin_slides import nearer_than_twins
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, inside_sign
 from contfric.signature.holds import ends_rest, is_hold
@@ -51,6 +52,9 @@ def sliding_events(
     first, point = located
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
+    tip = nearer_than_twins(orbit, before, point, settings)
+    if tip is not None and (found := nearly_reached(orbit, tip, settings)) is not None:
+        return [(found, tip)]
     point, here = _pulled_in(orbit, before, point, settings)
     if not _is_inside(here):
         point, here, first = with_holds_forward(here, before, point, settings, first)
