@@ -18,6 +18,7 @@ from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
+from contfric.atlas.shared_rests import shared_rest
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
@@ -198,6 +199,8 @@ def _follow_all(state: Exploration) -> None:
     while state.waiting:
         if len(state.branches) >= state.max_branches:
             state.notes.append(f"stopped at max_branches = {state.max_branches}")
+            rest = shared_rest(state.branches)
+            state.notes += [] if rest is None else [str(rest)]
             state.complete = False
             return
         event = state.waiting.popleft()

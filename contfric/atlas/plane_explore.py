@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.atlas.plane import Plane
-from contfric.atlas.plane_matching import is_known, twins_of
+from contfric.atlas.plane_matching import at_once, is_known, twins_of
 from contfric.atlas.plane_regions import regions_of
 from contfric.atlas.plane_sections import section_diagram, sections_of
 from contfric.atlas.plane_state import PlaneExploration, Progress
@@ -148,18 +148,19 @@ def _result(state: PlaneExploration, orbit: Orbit) -> Plane:
     regions, cells = regions_of(
         orbit.model, state.vector, state.box, state.curves, state.sections, state.max_periods
     )
+    twins = twins_of(state.curves)
     return Plane(
         orbit.model,
         state.box.names,
         np.column_stack([state.box.low, state.box.high]),
         state.vector,
         tuple(state.curves),
-        twins_of(state.curves),
+        twins,
         regions,
         cells,
         tuple(state.sections),
         state.complete,
-        tuple(state.notes),
+        (*state.notes, *at_once(state.curves, twins)),
     )
 
 

@@ -19,6 +19,8 @@ _NEAR = 3e-3
 #: A point solved on a known curve is the same if parameters (relative) and stops agree to this; where
 #: two curves meet they are located to about 1e-8.
 _SAME = 1e-6
+#: Points of a curve, as shares of them, that are asked whether they lie on one of another kind.
+_SHARES = (0.25, 0.5, 0.75)
 
 
 def group_of(kind: Kind, model: Model) -> Kind:
@@ -116,14 +118,52 @@ def twins_of(curves: list[Curve]) -> tuple[int, ...]:
         part = max(curve.parts, key=lambda p: float(p.arc[-1] - p.arc[0]))
         first = index
         if part.problem is not None and part.kind in TERMINAL:
-            known = is_known(part.problem, _middle(part), curves[:index], same_itinerary=False)
+            known = is_known(part.problem, _inside(part, 0.5), curves[:index], same_itinerary=False)
+            known = _of_other_kind(part, curves[:index]) if known is None else known
             first = index if known is None else found[known]
         found.append(first)
     return tuple(found)
 
 
-def _middle(part: CurvePart) -> Point:
-    k = len(part) // 2
+def at_once(curves: list[Curve], twins: tuple[int, ...]) -> list[str]:
+    """Return in words which curves are one along which two sliding events happen at once."""
+    found = []
+    for first in sorted(set(twins)):
+        same = [curve for k, curve in enumerate(curves) if twins[k] == first]
+        kinds = {group_of(part.kind, part.system.model) for c in same for part in c.parts}
+        if len(kinds) > 1 and kinds <= TERMINAL:
+            names = " and ".join(dict.fromkeys(curve.label for curve in same))
+            found.append(f"{names} are one curve: an event of codimension two all along it")
+    return found
+
+
+def _of_other_kind(part: CurvePart, curves: list[Curve]) -> int | None:
+    """Return the curve of another sliding event that has the same solutions all along; None if none has.
+
+    Where the load stands still at a stop on the limit, a CS and an AS happen at once. That takes two
+    parameters, but for special values of the others (Omega = 1/2 without damping): then two curves are one.
+    Curves of two kinds that only cross are not: all of three points lie on the same one.
+    """
+    assert part.problem is not None
+    model = part.system.model
+    for index, curve in enumerate(curves):
+        others = [p for p in curve.parts if p.kind in TERMINAL]
+        if not others or any(group_of(p.kind, model) is group_of(part.kind, model) for p in others):
+            continue
+        inside = (_inside(part, share) for share in _SHARES)
+        if all(_on_any(point, others, part.problem) for point in inside):
+            return index
+    return None
+
+
+def _on_any(point: Point, parts: list[CurvePart], problem: Problem) -> bool:
+    orbit = problem.orbit(point.joints, point.w)
+    return any(_on_part(orbit, point.w, part, problem) for part in parts)
+
+
+def _inside(part: CurvePart, share: float) -> Point:
+    """Return one of the points of a piece, at a share of them."""
+    k = int(share * len(part))
     none = np.empty(0)
     return Point(
         part.joints[k],

@@ -8,9 +8,9 @@ together. The values of the parameter are then those of
     p = c tau_1^2 + (terms of higher order),   p = c tau_2^2 + ...,
 
 and four orbits lie next to the event: (tau, tau), which is the branch, (-tau, -tau), and two on which only
-one of the holds is negative. At the event the equations have two null vectors. Newton's method, started as near
-to it as locations are, may converge to any of the four. An orbit on which one of the holds is negative is
-taken to the branch by giving that one the length -tau, and solving again normal to the way from the point
+one of the holds is negative. At the event the equations have two null vectors. Newton's method, started as
+near to it as locations are, may converge to any of the four. An orbit on which one of the holds is negative
+is taken to the branch by giving that one the length -tau, and solving again normal to the way from the point
 before. (Not at the same value of the parameter: beyond that of the event there is no orbit.)
 """
 

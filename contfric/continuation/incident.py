@@ -42,6 +42,8 @@ from contfric.signature.edits import apply_edit, edited_pieces
 _VANISHES = 1e-9
 #: The same at an event that is located to half of the digits only.
 _NEARLY = 1e-6
+#: The most that an event may be missed by: beyond it is not nearly reached.
+_FAR = 1e-5
 #: Most forms of a unit: six locations with two outcomes each.
 _MOST_FORMS = 64
 #: Where in a segment it is asked how far something has moved, as shares of it.
@@ -91,6 +93,7 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     """
     orbit = bifurcation.orbit.as_whole()
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
+    least = max(least, _missed(bifurcation)) if least == _NEARLY else least
     unit = unit_of(orbit)
     if not _moves(orbit):
         return Incident(
@@ -111,6 +114,17 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
         least,
         wide,
     )
+
+
+def _missed(bifurcation: Bifurcation) -> float:
+    """Return by how much an event that is nearly reached is missed: twice its largest margin.
+
+    What vanishes with these on another form has lengths as long as theirs.
+    """
+    orbit = bifurcation.orbit
+    margins = dict(zip(orbit.system.tests, orbit.margins.tolist(), strict=True))
+    left = [abs(margins[test]) for test in bifurcation.tests if test in margins]
+    return min(_FAR, 2.0 * max(left, default=0.0))
 
 
 def _moves(orbit: Orbit) -> bool:

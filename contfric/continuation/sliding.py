@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.holds_forward import with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
@@ -15,6 +15,7 @@ from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import point_before
 from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import is_rate_of
+from contfric.continuation.twin_slides import nearer_than_twins
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, inside_sign
 from contfric.signature.holds import ends_rest, is_hold
@@ -30,6 +31,8 @@ _REACHED = 1e-8
 ROUGHLY_REACHED = 1e-4
 #: The same where several holds end at once; what their lengths do to the orbit is the square of it.
 _NEARLY_REACHED = 1e-5
+#: Accuracy of an event that is nearly reached, at best: what follows is looked for as at any known roughly.
+_ROUGHLY = 2.0 * ACCURACY
 #: How far a located point is moved back (arclength): where a slide vanishes joints are known to no more.
 _BACK = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7)
 #: A margin this negative is no rounding of a sum of a few terms of order 1.
@@ -49,6 +52,9 @@ def sliding_events(
     first, point = located
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
+    tip = nearer_than_twins(orbit, before, point, settings)
+    if tip is not None and (found := nearly_reached(orbit, tip, settings)) is not None:
+        return [(found, tip)]
     point, here = _pulled_in(orbit, before, point, settings)
     if not _is_inside(here):
         point, here, first = with_holds_forward(here, before, point, settings, first)
@@ -320,8 +326,12 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
     found = bifurcation_at(kind, here, tip, None, tip, settings, group)
-    # the parameter changes by no more than the margins do, on the way that is left
-    return replace(found, bound=max(found.accuracy, _NEARLY_REACHED))
+    # the parameter changes by no more than the margins do, on the way that is left; as joints may be off by
+    # more, the event counts as known roughly
+    values = dict(zip(orbit.system.tests, tip.tests.tolist(), strict=False))
+    left = max(values[test] for test in near) / settings.width
+    known = min(_NEARLY_REACHED, max(_ROUGHLY, left))
+    return replace(found, bound=max(found.accuracy, known))
 
 
 def _once(here: Orbit, group: tuple[EventFunction, ...]) -> tuple[EventFunction, ...]:

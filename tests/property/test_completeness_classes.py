@@ -42,6 +42,8 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     ),
     "a bridge that is its own image beyond a fold of symmetric orbits": ((34, 112),),
     "an end of a bridge that rounding places anywhere": ((34, 204),),
+    "a narrow bridge whose last margin is nearly reached": ((39, 48),),
+    "two slides that vanish together, one of them first on another curve": ((40, 10),),
     "a stick that a slow load makes short, and that still ends in a jump": ((34, 360),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
