@@ -138,6 +138,14 @@ def _two_turns(data: dict[str, Any]) -> None:
         data["knots"][k] = [*joints, *later, value]
 
 
+def _back_and_forth(data: dict[str, Any]) -> None:
+    """From one sheet to the other and back: each box is right, and the only fold is there twice."""
+    k = data["events"][0][0]
+    part = data["knots"][k - 3 : k + 5]
+    data["knots"] = part + part[-2::-1]
+    data["events"], data["ends"] = [[3, "SN"], [2 * len(part) - 6, "SN"]], [None, None]
+
+
 def _gap(data: dict[str, Any]) -> None:
     """Leave boxes in the middle out, where there is no event."""
     first = data["events"][0][0] // 3
@@ -178,6 +186,7 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "one knot": lambda data: data.__setitem__("knots", data["knots"][:1]),
     "the same knot twice": lambda data: data["knots"].insert(5, data["knots"][5]),
     "two turns": _two_turns,
+    "back and forth": _back_and_forth,
     "a gap": _gap,
     "a ball for S": _param("S", "0.32 +/- 1e-6"),  # type: ignore[arg-type]
     "NaN for h": _param("h", math.nan),
