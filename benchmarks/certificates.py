@@ -14,6 +14,7 @@ python -m benchmarks.certificates cheats 10000     changed certificates: how man
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections import Counter
@@ -97,17 +98,18 @@ def models(count: int) -> None:
     root = Path(__file__).resolve().parents[1]
     files = sorted(path for folder in MODELS for path in (root / folder).glob("*.yaml"))
     found: Counter[str] = Counter()
-    offered: dict[str, str] = {}
+    refused: dict[str, str] = {}
+    offered: dict[str, Any] = {}
     seconds: list[float] = []
     for path in files:
         try:
             model = cf.load_model(path)
             ball_model(model, model.defaults)
+            offered[path.stem] = model
         except ContfricError as error:
-            offered[path.stem] = str(error)
-            continue
-        offered[path.stem] = ""
-        for _ in range(max(1, count // len(files))):
+            refused[path.stem] = str(error)
+    for name, model in offered.items():
+        for _ in range(math.ceil(count / len(offered))):
             params = {k: v * rng.uniform(0.8, 1.2) for k, v in model.defaults.items()}
             try:
                 state = rng.normal(size=len(model.states))
@@ -120,12 +122,13 @@ def models(count: int) -> None:
             what = "proved" if certificate.proved else certificate.why.split(";")[0]
             found[what] += 1
             if not certificate.proved:
-                print(f"{path.stem}: {params} {orbit.name}: {certificate.why}", flush=True)
-        print(f"{path.stem}: {dict(found)} so far", flush=True)
+                print(f"{name}: {params} {orbit.name}: {certificate.why}", flush=True)
+        print(f"{name}: {dict(found)} so far", flush=True)
     for what, number in found.most_common():
         print(f"{number:6d}  {what}")
-    for name, why in offered.items():
-        print(f"{name}: {why}" if why else f"{name}: offered")
+    print(f"offered for {len(offered)} models, refused for {len(refused)}:")
+    for name, why in refused.items():
+        print(f"{name}: {why}")
     print(f"{sum(seconds):.1f} s, median {np.median(seconds):.3f} s, most {max(seconds):.2f} s")
 
 

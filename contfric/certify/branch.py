@@ -146,7 +146,8 @@ class BranchCertificate(Shown):
     def open(self) -> list[str]:
         """Where an event of multipliers may be that is not proved, and ends without a proved one."""
         found = []
-        for name, kinds, count in _COUNTED:
+        # orbits with holds have no multipliers: of the events of a curve they have folds only
+        for name, kinds, count in _COUNTED[:1] if self.branch.system.holds else _COUNTED:
             for run in _runs(self.pieces, count):
                 known = {label.split("_")[0] for piece in run for label in piece.events}
                 if not known & kinds or (name != "tori" and len(run) > 1):

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
-from contfric.certify.chain import Segments, segments_of
+from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
 from contfric.certify.extended import Builder, EventCondition
-from contfric.certify.zeros import in_span, zeros_at_joints
+from contfric.certify.zeros import at_start, in_span, zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
@@ -57,9 +57,25 @@ def as_zero_of(
     if system.periods % own.periods:
         return None
     model = build(proof.value)
-    cycle = _cycle(proof, model)
-    if cycle is None:
-        return None
+    for touched in (False, True)[: 1 + _is_within(proof)]:
+        cycle = _cycle(proof, model, touched)
+        found = None if cycle is None else _on(cycle, system, segments, model, near)
+        if found is not None:
+            return [*found, proof.value]
+    return None
+
+
+def _is_within(proof: EventCertificate) -> bool:
+    """Tell whether the event is a touch within a segment."""
+    assert proof.location is not None
+    condition = proof.location.condition
+    return condition is not None and condition.within
+
+
+def _on(
+    cycle: _Cycle, system: System, segments: Segments, model: BallModel, near: Vector
+) -> Vector | None:
+    """Return the joints of a chain that the event's orbit solves, next to some; None if it does not."""
     m, count = segments.states + 1, segments.count
     found: list[tuple[int, int]] = []
     for i in range(count):
@@ -70,12 +86,11 @@ def as_zero_of(
     found.append(_closed(found[0], cycle, system))
     if not all(_leads(cycle, model, segments, i, *found[i : i + 2]) for i in range(count)):
         return None
-    joints = [_moved(cycle, at) for at in found[:-1]]
-    return [*(c for joint in joints for c in joint), proof.value]
+    return [c for at in found[:-1] for c in _moved(cycle, at)]
 
 
-def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
-    """Return the whole orbit of an event in phases."""
+def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> _Cycle | None:
+    """Return the whole orbit of an event in phases; with a joint where it touches a surface, if asked for."""
     location, event = proof.location, proof.event
     assert location is not None
     orbit = location.orbit
@@ -98,6 +113,21 @@ def _cycle(proof: EventCertificate, model: BallModel) -> _Cycle | None:
     closing = closing_of(segments, model, half)
     known = zeros_at_joints(segments, model, closing, met)
     modes, resets = list(segments.modes), list(segments.resets)
+    if touched and condition is not None:
+        i, chain = condition.segment, Chain(segments, model)
+        after, mode = proof.zero[-2] * scale, modes[i]
+        move = chain.move(i, [*joints, *joints[:1]])
+        end = numbers((move.field * after).exp() * move.start)
+        kept = at_start(segments, model, i, known[i])
+        kept = [row for row in kept if in_span(numbers(arb_mat([row]) * move.field), [])]
+        joints.insert(i + 1, [joints[i][0] + after, *end[: m - 1]])
+        row = _row(condition, segments, model)
+        rate = model.rate(condition.surface, mode)
+        if condition.departs:
+            rate = numbers(arb_mat([row]) * move.field)
+        known.insert(i + 1, [row, rate, *kept])
+        modes.insert(i + 1, mode)
+        resets.insert(i + 1, "")
     turn = arb(segments.turn) * two_pi
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
@@ -158,4 +188,4 @@ def _leads(
         return in_span(model.rows[segments.exits[i]], cycle.vanishing[end[0]])
     if isinstance(pin, str):
         return in_span(model.rows[pin], cycle.vanishing[j])
-    return in_span(numbers(arb_mat([model.rate(pin[1], pin[0])])), cycle.vanishing[j])
+    return in_span(model.rate(pin[1], pin[0]), cycle.vanishing[j])

@@ -196,9 +196,11 @@ class Tracer(Strand):
         if leaves is not None:
             points[leaves] = next((zero for _, zero, ends in events if ends), None)
         folds = 0 if box.monotone else self._count(box, 1, points, tangential)
-        flips = 0 if box.no_flip else self._count(box, -1, points, tangential)
+        # orbits with holds have no multipliers: the least disturbance ends a hold
+        held = bool(self.system.holds)
+        flips = 0 if held or box.no_flip else self._count(box, -1, points, tangential)
         ends = (float(values[0].mid()), float(values[1].mid()))
-        off = has_no_pair(self.segments, self.plain, self.closes, box)
+        off = held or has_no_pair(self.segments, self.plain, self.closes, box)
         tori = 0 if off else UNKNOWN
         knots = self.printed(box.first), self.printed(box.last)
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)

@@ -1,8 +1,8 @@
 """Pieces of a curve of orbits: each in a box, with what the law of friction says over all of it.
 
-The middle of a box is a line c(s), |s| <= 1/2; orbits differ from it by y, |y| <= r, with ``b y = 0``: the
-parameter is kept, or near a fold y is normal to c. With C near the inverse of the Jacobian J of F and b,
-``y - C F(c + y)`` contracts |y| <= r if ``|1 - C J| r + |C F(c)| < r``, and J y' = -dF(c + y)/ds is known.
+Orbits of a box are c(s) + y, c a line, |s| <= 1/2, |y| <= r, and ``b y = 0``: the parameter is kept, or
+near a fold y is normal to c. With C near the inverse of J, the Jacobian of F and b, ``y - C F(c + y)``
+contracts |y| <= r if ``|1 - C J| r + |C F(c)| < r``, and J y' = -dF(c + y)/ds is known.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ class Box:
         """Return scene and unknowns of all orbits, as power series in the direction of their curve."""
         rates = self.rates(arb(0), 1) + 2 * INSIDE * self.rates(INSIDE, 2)
         turned = self.gap.solve(size(self.inverse * rates)).entries()
-        return self.orbits(INSIDE, self.along + column(arb(0, r.upper()) for r in turned))
+        self.slope = self.along + column(arb(0, r.upper()) for r in turned)
+        return self.orbits(INSIDE, self.slope)
 
     def equations(self, s: arb) -> tuple[arb_mat, arb_mat]:
         """Return F, and the Jacobian of F and b."""
@@ -77,8 +78,7 @@ class Box:
 
     def rates(self, s: arb, order: int) -> arb_mat:
         """Return a coefficient of F along the line."""
-        scene, z = self.orbits(s, self.along)
-        return column(part(v, order) for v in [*scene.equations(z)[0], 0])
+        return column(part(v, order) for v in [*Scene.equations(*self.orbits(s, self.along))[0], 0])
 
     def holds(self, point: Box) -> bool:
         """Tell whether the orbit next to a point is one of the box."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import Any, NamedTuple
 
 from flint import acb, arb, ctx
@@ -70,25 +70,28 @@ def orbits_at(data: Any, known: Any = ()) -> list[Box]:
     return [*known, *(Box(data, at, None, Box(data, by, at).border).proved() for at, by in pairs)]
 
 
-def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], arb]:
-    """Return the events on the one curve of admissible orbits from a to b, or to an end; the parameter."""
+def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], Box]:
+    """Return the events on the one curve of admissible orbits from a to b, or to an end; and its box."""
     box = Box(data, a.middle.entries(), b.middle.entries()).proved()
     see(box.holds(a) and box.holds(b), "one curve from knot to knot", False)
     met, (scene, z) = met_in(box, a, b, *end) if end else {}, box.orbits(INSIDE)
     check_admissible(scene, z, met, bool(end) and end[0] == "CS")
-    return box.events(a, b) + ([end[0]] if end else []), scene.value
+    return box.events(a, b) + ([end[0]] if end else []), box
 
 
 def _check_tube(data: Any) -> list[str]:
-    points, (left, right), found = orbits_at(data), data["ends"], list[Any]()
+    points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Box]()
     stop = len(points) - 2
-    if stop < bool(left and right) or "T" in [end[0] for end in (left, right) if end]:
-        raise Refused("it has too few knots, or no tube ends in this way")
+    see(stop >= bool(left and right) and "T" not in f"{left}{right}", "a tube may have such ends")
     for k, (a, b) in enumerate(pairwise(points)):
         first, last, end = (b, a, left) if left and k == 0 else (a, b, right if k == stop else None)
         if end:
             check_admissible(*first.orbits(0))
-        found += [[k, kind] for kind in events_between(data, first, last, end)[0]]
+        kinds, box = events_between(data, first, last, end)
+        found, boxes = [*found, *([k, kind] for kind in kinds)], [*boxes, box]
+        turn, pairs = -1 if left and k == 1 else 1, permutations((boxes[k - 1], box))
+        goes = [(p.border * p.along * p.border * q.slope)[0, 0] * turn for p, q in pairs]
+        see(max(goes, key=arb.lower), "it goes on and does not turn back")
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
     return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"]
@@ -96,9 +99,9 @@ def _check_tube(data: Any) -> list[str]:
 
 def _check_event(data: Any) -> list[str]:
     kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
-    found, where = events_between(data, a, b, None if at is None else (kind, [at]))
+    found, box = events_between(data, a, b, None if at is None else (kind, [at]))
     see(found == [kind], f"it has those events, not {found}")
-    see(value.rad() - abs(where - value.mid()), "it happens within the ball")
+    see(value.rad() - abs(box.orbits(INSIDE)[0].value - value.mid()), "it is within the ball")
     return ["exists", f"is a {kind} in {data['parameter']}", "admissible"]
 
 
@@ -109,9 +112,8 @@ def _check_orbit(data: Any) -> list[str]:
     scene, z = Box(data, [*printed, ball(s)]).proved().orbits(0)
     for value, near, r in zip(z, printed, radius, strict=True):
         see(r - abs(value - near), "it lies in the box around the printed joints")
-    times = [value if k % 2 else value / scene.omega for k, value in enumerate(z)]
-    held = (ball(v).contains(w) for v, w in zip(data["enclosure"], times, strict=True))
-    see(all(held), "balls hold the joints", False)
+    for k, text in enumerate(data["enclosure"]):
+        see(ball(text).contains(z[k] if k % 2 else z[k] / scene.omega), "its ball holds it", False)
     if "unique" in claims:
         Box(data, [*printed, ball(s)]).proved([*radius, arb(0)])
     if "admissible" in claims:
@@ -122,10 +124,10 @@ def _check_orbit(data: Any) -> list[str]:
     see("unstable" not in claims or -min(jury, key=float), "a multiplier is outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
-    for disc, mu in zip(data["multipliers"], found, strict=bool(data["multipliers"])):
-        if not acb(ball(disc["re"]), ball(disc["im"])).contains(mu):
-            raise Undecided("the multipliers lie in their discs")
-    return [c for c in CLAIMS if c in claims] + ["multipliers"] * bool(data["multipliers"])
+    discs = [acb(ball(disc["re"]), ball(disc["im"])) for disc in data["multipliers"]]
+    held = (disc.contains(mu) for disc, mu in zip(discs, found, strict=bool(discs)))
+    see(all(held), "the multipliers lie in their discs", False)
+    return [c for c in CLAIMS if c in claims] + ["multipliers"] * bool(discs)
 
 
 CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}

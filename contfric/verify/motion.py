@@ -63,10 +63,9 @@ class Scene:
     def __init__(self, data: dict[str, Any], value: Any) -> None:
         self.periods, self.half = periods, _ = data["periods"], data["half"]
         possible = type(periods) is int and self.half in (False, periods % 2 == 1) and periods > 0
-        possible = possible and str not in map(type, data["params"].values())  # they are no balls
-        if not possible or {*data["params"], data["parameter"]} != set(PARAMETERS):
-            raise Refused("its parameters, periods and symmetry are not those of a periodic orbit")
-        p = {name: ball(given) for name, given in data["params"].items()}
+        possible = possible and {*data["params"], data["parameter"]} == set(PARAMETERS)
+        see(possible, "parameters, periods and symmetry are those of a periodic orbit")
+        p = {name: ball(given - 0) for name, given in data["params"].items()}  # and no text
         self.value = p[data["parameter"]] = value
         self.omega, self.s, self.s0, h, self.zeta = (p[name] for name in PARAMETERS)
         if not all((part(self.omega, 0) > 0, part(self.s, 0) >= 0, part(self.s0 - self.s, 0) >= 0)):
@@ -118,16 +117,15 @@ class Scene:
         load = y - self.force(end) + (-self.s0 if name == "F+" else self.s0)
         return load, v - first, a - second, jerk - self.force(end, 3)
 
-    def joint(self, z: list[Any], i: int) -> tuple[Any, Any]:
+    def joint(self, z: list[Any], i: int) -> Any:
         """Return joint i, the last one by periodicity or symmetry."""
-        after = z[0] + self.turn, self.closing * z[1]
-        return (z[2 * i], z[2 * i + 1]) if i < self.count else after
+        return z[2 * i :][:2] if i < self.count else (z[0] + self.turn, self.closing * z[1])
 
     def check_period(self, z: list[Any]) -> None:
         """See that no part of the period is one: the first joint does not come again after it."""
         for q in (q for q in range(2, self.count + 1) if self.periods % q == 0 == self.count % q):
-            (start, x), (phase, y) = self.joint(z, 0), self.joint(z, self.count // q)
-            off = abs(phase - start - self.turn / q) + abs(y - self.closing * x)
+            phase, x = self.joint(z, self.count // q)
+            off = abs(phase - z[0] - self.turn / q) + abs(x - self.closing * z[1])
             see(off, f"1/{q} of its period is not one")
 
     def duration(self, z: list[Any], i: int) -> Any:

@@ -138,6 +138,14 @@ def _two_turns(data: dict[str, Any]) -> None:
         data["knots"][k] = [*joints, *later, value]
 
 
+def _back_and_forth(data: dict[str, Any]) -> None:
+    """From one sheet to the other and back: each box is right, and the only fold is there twice."""
+    k = data["events"][0][0]
+    part = data["knots"][k - 3 : k + 5]
+    data["knots"] = part + part[-2::-1]
+    data["events"], data["ends"] = [[3, "SN"], [2 * len(part) - 6, "SN"]], [None, None]
+
+
 def _gap(data: dict[str, Any]) -> None:
     """Leave boxes in the middle out, where there is no event."""
     first = data["events"][0][0] // 3
@@ -178,6 +186,7 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "one knot": lambda data: data.__setitem__("knots", data["knots"][:1]),
     "the same knot twice": lambda data: data["knots"].insert(5, data["knots"][5]),
     "two turns": _two_turns,
+    "back and forth": _back_and_forth,
     "a gap": _gap,
     "a ball for S": _param("S", "0.32 +/- 1e-6"),  # type: ignore[arg-type]
     "NaN for h": _param("h", math.nan),
@@ -251,3 +260,20 @@ def test_a_tube_of_two_knots_cannot_have_two_ends() -> None:
     data = fold()
     data |= {"knots": data["knots"][-2:], "events": [], "ends": [data["ends"][1]] * 2}
     assert not is_verified(data)
+
+
+@pytest.mark.slow
+def test_a_tube_up_to_an_end_at_as() -> None:
+    """A stick is touched at its limit: at another kind, limit, time or segment the tube is refused."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.3, "S0": 0.4, "h": 0.25})
+    proof = certify_branch(cf.continue_orbit(orbit, "h", (0.249, 0.3)))
+    assert proof.complete, (proof.gaps, proof.open)
+    (data,) = tubes_of(proof)
+    assert is_verified(data)
+    kind, [[i, surface, time_]] = data["ends"][1]
+    assert kind == "AS"
+    later = time_.replace(time_[:4], f"{float(time_[:4]) + 0.01:.2f}", 1)
+    wrong = [["GS", [[i, surface, time_]]], ["AS", [[i, "F-", time_]]], ["CS", [[i, 1]]], None]
+    wrong += [["AS", [[i, surface, later]]], ["AS", [[i - 1, surface, time_]]]]
+    for end in wrong:
+        assert not is_verified(data | {"ends": [data["ends"][0], end]}), end

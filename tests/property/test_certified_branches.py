@@ -11,8 +11,9 @@ from flint import arb, ctx
 
 import contfric as cf
 from contfric.certify.branch import certify_branch
-from contfric.certify.chain import segments_of
+from contfric.certify.chain import Chain, segments_of
 from contfric.certify.phases import in_phases
+from contfric.certify.strand import Strand
 from contfric.certify.tracing import Tracer
 from contfric.certify.tube import Box, box_between, solved
 from contfric.continuation.events import EndReason
@@ -193,6 +194,29 @@ def test_bridges_and_asymmetric_branches_from_event_to_event() -> None:
     for branch in [*(b for b in branches if not b.mirrored), image]:
         certificate = branch.certify()
         assert certificate.complete, (branch, certificate.gaps, certificate.open)
+
+
+@pytest.mark.slow
+def test_events_of_bridges_with_holds_at_a_touch_solve_the_equations_of_their_branch() -> None:
+    """Folds and touches in between, and where a hold that begins at a touch is born or ends."""
+    orbit = cf.solve_orbit("coulomb", "2a-14seg", {"Omega": 0.5, "S": 0.06, "S0": 0.4})
+    branches = [b for b in cf.explore(orbit, "S", (0.011, 0.0665)).branches if not b.mirrored]
+    kinds = set()
+    for branch in (b for b in branches if b.system.holds):
+        proofs = [event.certify("S") for event in branch.bifurcations]
+        with ctx.workprec(80):
+            strand = Strand(branch)
+            for label, zero, _ in strand.met_by(proofs):
+                model = strand.plain(zero[-1])
+                residual = Chain(strand.segments, model).residual(zero[:-1])
+                assert all(abs(r) < 1e-15 for r in residual), label
+                kinds.add(label.split("_")[0])
+    assert kinds >= {"SN", "T", "GS", "SS"}
+    folded = max(branches, key=lambda b: sum(e.kind == "SN" for e in b.bifurcations))
+    certificate = folded.certify()
+    assert sum(label.startswith("SN") for label in certificate.events) == 1  # labels are the same
+    assert sum(piece.folds for piece in certificate.pieces) == 3
+    assert certificate.complete, (certificate.gaps, certificate.open)
 
 
 @pytest.mark.parametrize(("parameter", "kind"), [("Omega", "BP"), ("S", "PD")])
