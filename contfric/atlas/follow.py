@@ -244,7 +244,8 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     for end in ends:
         state.merge(event, end)
         assert end.bifurcation is not None
-        event.bifurcation = end.bifurcation
+        if end.bifurcation.accuracy < event.bifurcation.accuracy:
+            event.bifurcation = end.bifurcation
     return True
 
 
@@ -261,7 +262,8 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
     ends = [end for end in whole.ends if meets(end, event, state.settings)]
-    least = min(known, ACCURACY)
+    # one that begins outside needs its own location, even if the event is known as well
+    least = ACCURACY if outside else min(known, ACCURACY)
     better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= least]
     return (whole, better[:1]) if better and not fault_of(whole) else (branch, [])
 

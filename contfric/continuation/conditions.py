@@ -15,7 +15,9 @@ inequalities are the margins that vanish at the event.
 Where a hold can just not be left inside any more, the acceleration ``a = k t^2 / 2 + w`` with which it would
 be left touches zero. For w > 0 it lasts. For w < 0 there are a slide from -2 d to d, ``d^2 = -2 w / k``, and
 a second hold. The slide moves the mass by the fourth power of d, the square of w. So to first order the
-relation of this form is that of the form with one hold; its inequality is -w >= 0 in place of w >= 0.
+relation of this form is that of the form with one hold; its inequality is -w >= 0 in place of w >= 0. So it
+is where nothing jumps and a load touches its limit inside of a rest: a slip of length 3 d,
+``d^2 = 2 w / k``, moves the mass by d^4, too.
 
 Without excitation every unit ends at time 0 (:mod:`contfric.orbit.clock`): the time of u is minus the
 duration of its unit, and that of u' has no column. So the ring of a sequence is regular there, too.
@@ -39,8 +41,8 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import jacobian_blocks, linearised
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
-from contfric.orbit.system import Margin
-from contfric.signature.holds import TOUCH, is_hold
+from contfric.orbit.system import EventFunction, Margin
+from contfric.signature.holds import TOUCH, ends_rest, is_hold
 
 #: Singular values below this, relative to the largest, belong to null directions: events are located to
 #: 1e-13, and directions at a tangency to the root of that.
@@ -77,6 +79,17 @@ class Relation:
     rows: FloatArray
     margins: FloatArray
     signed: FloatArray
+
+
+@dataclass(frozen=True)
+class Parted:
+    """A rest that a slide of no length parts: its segment without the slide, and the limit that it passes.
+
+    A hold is parted where it could be left: no surface tells that.
+    """
+
+    segment: int
+    surface: str | None
 
 
 def relation_of(form: Form, active: int, least: float) -> Relation | None:
@@ -175,17 +188,19 @@ def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
 
 
 def _gradients(
-    orbit: Orbit, active: int, least: float, parted: tuple[int, ...]
+    orbit: Orbit, active: int, least: float, parted: tuple[Parted, ...]
 ) -> list[tuple[FloatArray, float]]:
     """Return the gradients of the vanishing margins on the joints, shape (N + 1, m), and on the parameter.
 
-    A hold in ``parted`` is one that cannot be left inside: that margin counts with the other sign.
+    What parts a rest counts with the other sign: it is left there.
     """
     whole, count = orbit.as_whole(), orbit.system.segments
     found = []
     for location, _ in vanishing(whole, least):
         held = location.margin is Margin.HELD
-        if location.segment >= count or (held and location.segment in parted):
+        own = Parted(location.segment, None if held else location.surface)
+        inside = location.margin in (Margin.HELD, Margin.INTERIOR)
+        if location.segment >= count or (inside and own in parted):
             continue
         gradient = (
             held_gradient(whole, location.segment, count, active)
@@ -194,32 +209,52 @@ def _gradients(
         )
         if gradient is not None:
             found.append(gradient)
-    for segment in parted:
-        gradient = held_gradient(whole, segment, count, active)
+    for left in parted:
+        gradient = (
+            held_gradient(whole, left.segment, count, active)
+            if left.surface is None
+            else gradient_of(
+                whole, EventFunction(Margin.INTERIOR, left.segment, left.surface), count, active
+            )
+        )
         if gradient is not None:
             found.append((-gradient[0], -gradient[1]))
     return found
 
 
-def _without_slides(form: Form) -> tuple[Form, tuple[int, ...]]:
-    """Return a form without slides of no length between two holds, and the holds that they part."""
+def _without_slides(form: Form) -> tuple[Form, tuple[Parted, ...]]:
+    """Return a form without slides of no length inside of a rest, and the rests that they part.
+
+    Such a slide is between two holds, or, where nothing jumps, between two rests of one mode.
+    """
     gone: set[int] = set()
-    parted, count = [], len(form.itinerary)
-    unit = time_unit(form.orbit)
-    for h in range(count - 2):
-        (_, first), (_, second) = form.itinerary[h], form.itinerary[h + 2]
-        lasts = form.joints[h + 2, 0] - form.joints[h + 1, 0]
-        if is_hold(first) and second == TOUCH and abs(lasts) < NEARLY_NO_LENGTH * unit:
-            if h not in gone:
-                parted.append(h - len(gone))
-            gone |= {h + 1, h + 2}
+    parted: list[Parted] = []
+    itinerary, count = list(form.itinerary), len(form.itinerary)
+    unit, model = time_unit(form.orbit), form.orbit.model
+    for h in range(count - 3, -1, -1):
+        (mode, first), _, (then, last) = itinerary[h : h + 3]
+        if abs(form.joints[h + 2, 0] - form.joints[h + 1, 0]) >= NEARLY_NO_LENGTH * unit:
+            continue
+        held = is_hold(first) and last == TOUCH
+        if not held:
+            if not (model.filippov and mode == then and ends_rest(model, mode, first)):
+                continue
+            itinerary[h] = mode, last
+        # what parts the rest after the slide parts this one now; a hold is parted once
+        own = Parted(h, None if held else first)
+        others = [replace(p, segment=h) if p.segment == h + 2 else p for p in parted]
+        parted = [own, *(p for p in others if p != own)]
+        gone |= {h + 1, h + 2}
     if not gone:
         return form, ()
     kept = [i for i in range(count) if i not in gone]
-    itinerary = tuple(form.itinerary[i] for i in kept)
-    return replace(
-        form, itinerary=itinerary, joints=form.joints[kept], away=form.away[kept]
-    ), tuple(parted)
+    without = replace(
+        form,
+        itinerary=tuple(itinerary[i] for i in kept),
+        joints=form.joints[kept],
+        away=form.away[kept],
+    )
+    return without, tuple(replace(p, segment=kept.index(p.segment)) for p in parted)
 
 
 # --------------------------------------------------------------------------------- sequences

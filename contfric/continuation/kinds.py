@@ -35,6 +35,7 @@ from contfric.continuation.touching import (
     chosen_at,
     is_corner,
     rate_along,
+    rest_at,
     resting_domain,
     touched_at_joint,
 )
@@ -113,7 +114,7 @@ def outward_rate(system: System, test: EventFunction, orbit: Orbit) -> float:
 
     Infinite where there is no rest.
     """
-    resting = resting_domain(system, test)
+    resting = rest_at(test, orbit)
     if resting is None:
         return np.inf
     end = orbit.ends[test.segment]
@@ -127,7 +128,7 @@ def _leaves(system: System, test: EventFunction, orbit: Orbit) -> bool:
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
     """
     rate = outward_rate(system, test, orbit)
-    resting = resting_domain(system, test)
+    resting = rest_at(test, orbit)
     if resting is None or abs(rate) >= ROUNDED:
         return rate > 0.0
     sign, end = resting.signs[test.surface], orbit.ends[test.segment]
@@ -139,7 +140,7 @@ def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
 
     Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.
     """
-    resting = resting_domain(orbit.system, test)
+    resting = rest_at(test, orbit)
     if resting is None or abs(outward_rate(orbit.system, test, orbit)) >= ROUNDED:
         return False
     end = orbit.ends[test.segment]

@@ -27,8 +27,8 @@ Where a stick becomes a hold, the hold lasts to the release, unless before that 
 more: there it ends, with a slide of length zero, and the rest of the stick follows.
 
 Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
-of Filippov): there, and where nothing else is known, :mod:`contfric.continuation.from_simulation` lets the
-flow itself say what follows.
+of Filippov): rest whose load touches its limit slips there for no time. Where nothing else is known,
+:mod:`contfric.continuation.from_simulation` lets the flow itself say what follows.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from contfric.continuation import standing_slides as slides
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.standing_slides import goes_nowhere, left_out, only_touches, touch_alone
 from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
@@ -71,7 +71,6 @@ NEARLY_NO_LENGTH = 1e-3
 _APPEARS = (-0.5, 0.5)
 #: Where a has a double zero, ``a = k (t^2 - w^2) / 2``, a slide that is left at -2w touches rest at w.
 _APPEARS_TOUCHING = (-2.0, 1.0)
-
 #: Where the segments of an edited itinerary come from, as :func:`contfric.signature.edits.edited_pieces`
 #: says.
 Origin = tuple[int, int]
@@ -157,8 +156,8 @@ def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Outcome:
     """SS: the stop is on a surface, and the load falls."""
     model, itinerary, i = orbit.model, orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
-    if goes_nowhere(orbit, j):
-        return Outcome(*left_out(orbit, j))
+    if slides.goes_nowhere(orbit, j):
+        return Outcome(*slides.left_out(orbit, j))
     rest = _rest_mode(orbit, i, itinerary[i][1])
     _check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
     if model.lies_on(itinerary[j][0], itinerary[i][1]):
@@ -175,8 +174,8 @@ def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     _rest_mode(orbit, i, itinerary[i][1])
     if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
-    if only_touches(orbit, j):
-        return Outcome(*touch_alone(orbit, j))
+    if slides.only_touches(orbit, j):
+        return Outcome(*slides.touch_alone(orbit, j))
     _check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
@@ -184,6 +183,8 @@ def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
 def _released_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     """AS: a stick is released where its load just reaches the limit."""
     i, (mode, exit_) = location.segment, orbit.itinerary[location.segment]
+    if slides.only_touches(orbit, i + 1):
+        return Outcome(*slides.touch_alone(orbit, (i + 1) % len(orbit.itinerary)))
     _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
     reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
@@ -204,6 +205,8 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     j = (i + 1) % len(itinerary)
     touch = touch_of(orbit, i, location.surface)
     departs = _released(model, mode, location.surface)
+    if model.filippov:
+        return Outcome(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
     _check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
@@ -246,9 +249,7 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
         return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
     edit = split(j, hold)
-    if is_hold(
-        itinerary[behind][1]
-    ):  # the stick ended tangentially: one hold takes the place of both
+    if is_hold(itinerary[behind][1]):  # the stick ended tangentially: one hold replaces both
         edit |= drop(behind)
     return Outcome(edit, {}, reason)
 
@@ -289,9 +290,8 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
         return _pin_moves(orbit, location, after_rest)
     lasts = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
     gone = lasts < NEARLY_NO_LENGTH * time_unit(orbit)
-    if (
-        gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH
-    ):  # a second hold, and the slide between them
+    # a second hold, and the slide between them
+    if gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
         return _never_left(orbit, h, after_rest)
     touch = touch_of(orbit, h, None)
     departs = itinerary[behind][0]

@@ -7,22 +7,27 @@ number. So which of them is located first is rounding. It is one event: at the s
 is at its limit (SS). Without the slide the solution is the same.
 
 Motion that just touches a surface on which it could slide does so for no time, and goes on as before.
+And rest whose load just touches its limit slips for no time.
 """
 
 from __future__ import annotations
 
 from contfric.continuation.touching import rate_along
+from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
 from contfric.orbit.system import EventFunction, Margin
-from contfric.signature.edits import Edit, drop
-from contfric.signature.holds import is_hold
+from contfric.signature.edits import Edit, drop, split
+from contfric.signature.holds import is_hold, left_surface
 
 #: Acceleration below which a slide does not move: where Newton fails just before the event, what is left.
 STANDS = 1e-5
 #: Sliding from a touch on lasts as the root of how far the touch is beyond the surface, and that is rounding.
 _TOUCHES = 1e-4
+
+#: Where a load just exceeds its limit, the acceleration ``k (d^2 - t^2) / 2``, a slip from -d ends at 2d.
+_SLIPS = (-1.0, 2.0)
 
 
 def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
@@ -56,6 +61,7 @@ def left_out(orbit: Orbit, i: int) -> tuple[Edit, dict[tuple[int, int], FloatArr
 def only_touches(orbit: Orbit, j: int) -> bool:
     """Tell whether segment ``j`` moves on a surface for no time, between two of one mode; nothing jumps."""
     itinerary = orbit.itinerary
+    j %= len(itinerary)
     lasts = orbit.ends[j, 0] - orbit.cycle[j, 0]
     same = itinerary[j - 1][0] == itinerary[(j + 1) % len(itinerary)][0]
     return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))
@@ -67,3 +73,25 @@ def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, dict[tuple[int, int], Float
     behind = (j + 1) % count
     edit = Edit(frozenset({j, behind}), {(j - 1) % count: orbit.itinerary[behind][1]})
     return edit, {}, f"segment {j + 1} vanishes: its surface is only touched"
+
+
+def slip_at_touch(
+    orbit: Orbit, i: int, surface: str, departs: str, touch: FloatArray
+) -> tuple[Edit, dict[tuple[int, int], FloatArray], str, dict[tuple[int, int], float]]:
+    """Return the edit that lets rest ``i`` slip for no time where its load touches its limit.
+
+    With the joints, a reason, and how fast the joints move in time when the slip opens.
+
+    Raises
+    ------
+    NotationError
+        If the rest begins at the touch, after such a slip.
+    """
+    mode, exit_ = orbit.itinerary[i]
+    behind = touch[0] - orbit.begins[i, 0] < _TOUCHES * time_unit(orbit)
+    if behind and orbit.itinerary[i - 1][0] == departs and only_touches(orbit, i - 1):
+        raise NotationError(f"the slip before stick {i + 1} is at this touch of {surface}")
+    left = (departs, left_surface(orbit.model, mode, departs))
+    away = {(i, 0): _SLIPS[0], (i, 1): _SLIPS[1]}
+    reason = f"slip at the touch of {surface} in stick {i + 1}"
+    return split(i, surface, left, (mode, exit_)), {(i, 0): touch, (i, 1): touch}, reason, away

@@ -19,6 +19,8 @@ from contfric.orbit.system import EventFunction, Margin, System
 _TANGENTIAL = 1e-9
 #: A surface that is met faster than this is passed: a graze is located to the root of rounding.
 _PASSED = 1e-4
+#: A state this far beyond a surface is not inside: an event at a corner is located to the root of rounding.
+_OUTSIDE = 1e-6
 #: Random states by which two functions are compared.
 _STATES = 6
 
@@ -37,7 +39,7 @@ def touched_at_joint(system: System, test: EventFunction, orbit: Orbit) -> str |
         return (
             test.surface if abs(rate_along(orbit, mode, test.surface, end)) < _TANGENTIAL else None
         )
-    if exit_ not in model.surface_by_name or resting_domain(system, test) is not None:
+    if exit_ not in model.surface_by_name or rest_at(test, orbit) is not None:
         return None
     for touched, other in ((test.surface, exit_), (exit_, test.surface)):
         slow = abs(rate_along(orbit, mode, touched, end)) < _PASSED
@@ -59,11 +61,36 @@ def resting_domain(system: System, test: EventFunction) -> Domain | None:
 
     Where the surface is that of another contact, whose state changes at the same time, the rest goes on.
     """
-    return _resting(system.model, *system.itinerary[test.segment], test.surface)
+    return next(iter(_resting(system.model, *system.itinerary[test.segment], test.surface)), None)
+
+
+def rest_at(test: EventFunction, orbit: Orbit) -> Domain | None:
+    """Return the domain of rest that the state at a joint is next to, which the surface of a test ends.
+
+    None where the state is outside of it by another of its surfaces: a mass that meets a wall as it turns,
+    under a load above the limit of rest, does not rest there on either side of the wall.
+    """
+    mode, exit_ = orbit.system.itinerary[test.segment]
+    end = orbit.ends[test.segment]
+    for domain in _resting(orbit.model, mode, exit_, test.surface):
+        if all(
+            sign * _above(orbit, name, end) > -_OUTSIDE
+            for name, sign in domain.signs.items()
+            if sign and name not in (exit_, test.surface)
+        ):
+            return domain
+    return None
+
+
+def _above(orbit: Orbit, surface: str, joint: FloatArray) -> float:
+    """Return by how much a state is above a surface."""
+    observable = orbit.model.surface_by_name[surface].observable
+    there = orbit.flow.observe(observable, float(joint[0]), joint[1:])
+    return float(there - orbit.flow.level(surface))
 
 
 @cache
-def _resting(model: Model, mode: str, exit_: str, surface: str) -> Domain | None:
+def _resting(model: Model, mode: str, exit_: str, surface: str) -> tuple[Domain, ...]:
     resting = [
         d
         for d in _near(model, mode, exit_)
@@ -73,7 +100,7 @@ def _resting(model: Model, mode: str, exit_: str, surface: str) -> Domain | None
     others = [
         d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, surface, exit_)
     ]
-    return next(iter([*own, *others]), None)
+    return (*own, *others)
 
 
 def _near(model: Model, mode: str, exit_: str) -> Iterable[Domain]:

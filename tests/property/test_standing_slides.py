@@ -76,3 +76,26 @@ def test_an_event_at_which_a_slide_stands_is_known_as_well_as_without_it(case: i
         assert gap <= rough.accuracy + best.accuracy
     ends = [end for branch in found.branches for end in branch.ends if end.bifurcation is not None]
     assert not any("switching" in str(end) and "discontinuous" in str(end) for end in ends)
+
+
+#: From a touch of this diagram a branch began outside of its conditions by 1e-9, twice what is known.
+BEGINS = {
+    "k": 6.31743,
+    "b": 0.69899,
+    "m": 0.82031,
+    "Ff": 0.64451,
+    "omega": 1.00497,
+    "a": 1.1598,
+    "e": 0.80765,
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_leaves_a_slide_that_stands_begins_inside_of_its_conditions(seed: int) -> None:
+    rng = np.random.default_rng([83, seed])
+    params = {name: value * (1.0 + rng.uniform(-1e-6, 1e-6)) for name, value in BEGINS.items()}
+    orbit = cf.find_orbit("impact-friction", params, longest=1000, state=[-0.08, 0.0], time=-1.5)
+    found = cf.explore(orbit, "k", (4.85, 6.78), max_branches=60, max_periods=2)
+    points = [point for branch in found.branches if not branch.mirrored for point in branch]
+    assert all(point.admissible for point in points)
+    assert found.of_kind("SS")
