@@ -23,6 +23,10 @@ from contfric.signature.holds import ends_rest, is_hold
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
 #: zero to about 1e-13; distinct events this near are beyond what a diagram can tell apart.
 _TOGETHER = 1e-9
+#: A margin that has more than this share of its change over a step left, where another one vanishes, vanishes
+#: well behind it. Nearer ones are located: where orbits shrink to a point, Newton's method may find another
+#: curve there (the parameter was off by 5e-6, with 2 % of the other margin's change left).
+_BEHIND = 0.1
 #: Newton may fail right after an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
@@ -107,7 +111,8 @@ def _first_located(
     found: list[tuple[float, int, Point]] = []
     first: Point | None = None
     for k in violated[order].tolist():
-        if first is not None and not first.lost and first.tests[k] > _TOGETHER:
+        change = float(before.tests[k] - after.tests[k])
+        if first is not None and not first.lost and first.tests[k] > _BEHIND * change:
             continue
         point = locate_change(orbit, before, after, settings, BY_TEST, k)
         if point is not None:

@@ -76,7 +76,7 @@ class ComposedModel(Model):
     @cached_property
     def surface_by_name(self) -> dict[str, Surface]:
         """Surfaces by their names; the limits of shared loads are made when they are asked for."""
-        found = Made(lambda name: self.surfaces[self.surface_index[name]], self._is_surface)
+        found = Made(self._surface, self._is_surface)
         found.update({s.name: s for s in self.surfaces})
         return found
 
@@ -86,6 +86,10 @@ class ComposedModel(Model):
         found = Made(self._see, self._is_surface)
         found.update({s.name: k for k, s in enumerate(self.surfaces)})
         return found
+
+    def _surface(self, name: str) -> Surface:
+        number = self.surface_index[name]  # it makes the surface, if that is a new one
+        return self.surfaces[number]
 
     def _is_surface(self, name: object) -> bool:
         if name in self.composition.declared:
