@@ -26,7 +26,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
+from contfric.orbit.sections import canonical, joints_left
 from contfric.orbit.slides import SAME_SOLUTION
 from contfric.orbit.system import Itinerary, build_system
 
@@ -135,13 +135,24 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
     except NotationError as error:
         return Candidate(reason, None, str(error))
     itineraries = frozenset(form.itinerary for form in forms)
+    orbit, away = _without_sections(orbit, away)
     if not np.any(away):
-        plain = canonical(orbit)  # joints on sections would stand among others
-        orbit = plain.as_half() if orbit.system.half and plain is not orbit else plain
         return Candidate(reason, orbit, itineraries=itineraries)
     moves = np.zeros(orbit.joints.shape)
     moves[:, 0] = away
     return Candidate(reason, orbit, away=moves, itineraries=itineraries)
+
+
+def _without_sections(orbit: Orbit, away: FloatArray) -> tuple[Orbit, FloatArray]:
+    """Return an orbit, and how its joints move in time, without joints on sections among others."""
+    plain = canonical(orbit)
+    if plain is orbit:
+        return orbit, away
+    whole = orbit.as_whole()
+    if orbit.system.half:
+        plain, away = plain.as_half(), np.concatenate((away, away))
+    left = joints_left(orbit.model, whole.system.itinerary)
+    return plain, away[left][: len(plain.joints)]
 
 
 def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> str:

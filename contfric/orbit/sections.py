@@ -64,7 +64,7 @@ def without_sections(
     """
     if not model.joined:
         return itinerary, joints, end
-    kept = [i for i, pair in enumerate(itinerary) if pair not in model.sections]
+    kept = _others(model, itinerary)
     if not kept:
         kept = _fastest(model, itinerary, joints, end, vector, periods)
     first = kept[-1] + 1 - len(itinerary)  # the first segment may begin in the cycle before
@@ -80,6 +80,17 @@ def without_sections(
         for i in kept
     )
     return pairs, found, float(found[0, 0]) + period
+
+
+def _others(model: Model, itinerary: Itinerary) -> list[int]:
+    """Return the numbers of the segments that end on no section."""
+    return [i for i, pair in enumerate(itinerary) if pair not in model.sections]
+
+
+def joints_left(model: Model, itinerary: Itinerary) -> list[int]:
+    """Return the numbers of the joints that a whole cycle keeps without those on sections, in order."""
+    kept = _others(model, itinerary)
+    return [(kept[-1] + 1) % len(itinerary), *(i + 1 for i in kept[:-1])]
 
 
 def loops(
