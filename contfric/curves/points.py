@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from contfric.base.interrupts import held_back
 from contfric.base.tally import tally
 from contfric.continuation.points import SMALLEST_STEP, Point, Rows
 from contfric.curves.problem import Problem, border_of
@@ -96,7 +97,8 @@ def march_rows(
         options[BUDGET], before, began = _PACE.budget, int(counts[0]), perf_counter()
         taken, k = taken + last - k, last
         course = Course(options, corners, k, start_z, start_w, taken, arrays, counts)
-        why, last, options[0] = march_curve(compiled, border, course)
+        with held_back():  # compiled code may call Python, which would print Ctrl-C and drop it
+            why, last, options[0] = march_curve(compiled, border, course)
         problem.raise_kept()
         _PACE.took(int(counts[0]) - before, perf_counter() - began)
     return int(why), int(last), float(options[0])

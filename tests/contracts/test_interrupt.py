@@ -16,6 +16,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.exploration import Exploration
 from contfric.base.interrupts import held_back
+from contfric.curves.quantity_step import _Called
 
 #: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
 AT_ONCE = 3.0
@@ -244,3 +245,21 @@ def _cutting(judge, at: int):
         return result
 
     return cut
+
+
+def test_ctrl_c_as_compiled_code_calls_python_ends_a_curve(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before the first line of such a function nothing can be caught, and what is raised is only printed."""
+    call, box = _Called._call, {"Omega": (0.45, 0.52), "S": (0.3, 0.34)}
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    held = orbit.quantity("rms(x)")
+
+    def interrupted(self: _Called, number: int) -> int:
+        os.kill(os.getpid(), signal.SIGINT)
+        return call(self, number)
+
+    monkeypatch.setattr(_Called, "_call", interrupted)
+    try:
+        curve = cf.continue_quantity(orbit, "rms(x)", held, ("Omega", "S"), box)
+    except KeyboardInterrupt:
+        return  # before there is a point to keep
+    assert cf.CurveEndReason.INTERRUPTED in {end.reason for end in curve.ends}
