@@ -30,7 +30,7 @@ from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse,
 from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.touching import resting_domain
+from contfric.continuation.touching import rest_at
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
@@ -289,7 +289,7 @@ def _of_kind(
     if condition.rate or condition.within or condition.departs:
         return Finding(Verdict.PROVED)
     test = EventFunction(Margin.JOINT, condition.segment, condition.surface)
-    resting = resting_domain(location.orbit.system, test)
+    resting = rest_at(test, location.orbit)
     if resting is None:
         proved = event.kind is Kind.CS
         return Finding(Verdict.PROVED if proved else Verdict.UNDECIDED, "nothing rests there")

@@ -39,7 +39,7 @@ from contfric.continuation.touching import (
     resting_domain,
     touched_at_joint,
 )
-from contfric.models.definition import FloatArray
+from contfric.models.definition import Domain, FloatArray
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, System, inside_sign
@@ -77,7 +77,7 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
         if ends_rest(model, mode, touched):
             return Kind.AS
         return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
-    return Kind.CS if _leaves(system, test, orbit) else Kind.SS
+    return Kind.CS if _leaves(test, orbit) else Kind.SS
 
 
 def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
@@ -109,27 +109,23 @@ def kind_of_hold(hold: Hold, test: EventFunction) -> Kind:
     return Kind.AS if hold.after_rest else Kind.GS
 
 
-def outward_rate(system: System, test: EventFunction, orbit: Orbit) -> float:
-    """Rate at which a state that rests at the joint would leave the region where it can rest.
-
-    Infinite where there is no rest.
-    """
-    resting = rest_at(test, orbit)
-    if resting is None:
-        return np.inf
+def outward_rate(resting: Domain, test: EventFunction, orbit: Orbit) -> float:
+    """Rate at which a state that rests at the joint would leave the region where it can rest."""
     end = orbit.ends[test.segment]
     return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
 
 
-def _leaves(system: System, test: EventFunction, orbit: Orbit) -> bool:
+def _leaves(test: EventFunction, orbit: Orbit) -> bool:
     """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
 
     A load that stands still at the stop grows after it where it has its minimum: a stick around the minimum
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
     """
-    rate = outward_rate(system, test, orbit)
     resting = rest_at(test, orbit)
-    if resting is None or abs(rate) >= ROUNDED:
+    if resting is None:  # it is left
+        return True
+    rate = outward_rate(resting, test, orbit)
+    if abs(rate) >= ROUNDED:
         return rate > 0.0
     sign, end = resting.signs[test.surface], orbit.ends[test.segment]
     return bends_outward(orbit, resting.mode, test.surface, sign, end)
@@ -141,7 +137,7 @@ def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
     Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.
     """
     resting = rest_at(test, orbit)
-    if resting is None or abs(outward_rate(orbit.system, test, orbit)) >= ROUNDED:
+    if resting is None or abs(outward_rate(resting, test, orbit)) >= ROUNDED:
         return False
     end = orbit.ends[test.segment]
     rates = _rates_beside(orbit, resting.mode, test.surface, end)

@@ -74,19 +74,12 @@ def rest_at(test: EventFunction, orbit: Orbit) -> Domain | None:
     end = orbit.ends[test.segment]
     for domain in _resting(orbit.model, mode, exit_, test.surface):
         if all(
-            sign * _above(orbit, name, end) > -_OUTSIDE
+            sign * orbit.flow.height(name, float(end[0]), end[1:]) > -_OUTSIDE
             for name, sign in domain.signs.items()
             if sign and name not in (exit_, test.surface)
         ):
             return domain
     return None
-
-
-def _above(orbit: Orbit, surface: str, joint: FloatArray) -> float:
-    """Return by how much a state is above a surface."""
-    observable = orbit.model.surface_by_name[surface].observable
-    there = orbit.flow.observe(observable, float(joint[0]), joint[1:])
-    return float(there - orbit.flow.level(surface))
 
 
 @cache

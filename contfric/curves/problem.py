@@ -10,7 +10,7 @@ import numpy as np
 
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.touching import resting_domain
+from contfric.continuation.touching import rest_at
 from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
@@ -177,7 +177,7 @@ def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -
     pinned = [] if kind is Kind.T else _vanishing(orbit)
     rest = -1
     if kind in (Kind.CS, Kind.SS) and location == JOINT:
-        rest = _rest_mode(system, test)
+        rest = _rest_mode(orbit, test)
     condition = Condition(
         location,
         segment,
@@ -223,12 +223,10 @@ def _tangential(test: EventFunction, orbit: Orbit) -> EventFunction | None:
     return next(exits, None)
 
 
-def _rest_mode(system: System, test: EventFunction) -> int:
+def _rest_mode(orbit: Orbit, test: EventFunction) -> int:
     """Return the mode of rest whose rate at a stop tells CS from SS; -1 where there is no rest."""
-    resting = resting_domain(system, test)
-    if resting is None:
-        return -1
-    return system.model.mode_index[resting.mode]
+    resting = rest_at(test, orbit)
+    return -1 if resting is None else orbit.model.mode_index[resting.mode]
 
 
 def _quiet(system: System, kind: Kind, segment: int, pinned: list[EventFunction]) -> IntArray:
