@@ -92,7 +92,7 @@ def _unboxed(typ: Any, value: Any, c: Any) -> NativeValue:
 
 
 @infer_getattr
-class _Members(AttributeTemplate):  # type: ignore[misc]
+class _HandleMembers(AttributeTemplate):  # type: ignore[misc]
     """What an attribute of a handle is."""
 
     key = HandleType

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
+from contfric.continuation.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.sliding import sliding_events
 from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
-from contfric.continuation.told import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.orbit.orbit import Orbit
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.base.tally import tally
-from contfric.continuation.points import Point, Rows, Settings
+from contfric.continuation.points import Point, PointRows, Settings
 from contfric.continuation.side import branch_problem
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -24,13 +24,13 @@ class _Trials(threading.local):
     """Four rows for locations, of the system last at work in this thread: allocated once a branch."""
 
     system: System | None = None
-    rows: Rows
+    rows: PointRows
     arrays: Points
 
-    def between(self, system: System, before: Point, after: Point) -> Rows:
+    def between(self, system: System, before: Point, after: Point) -> PointRows:
         """Return the rows with both points, and nothing of an earlier location."""
         if self.system is not system:
-            self.rows, self.system = Rows.empty(system, 4), system
+            self.rows, self.system = PointRows.empty(system, 4), system
             self.arrays = self.rows.arrays()
         rows = self.rows
         rows.put(0, before)

@@ -183,7 +183,7 @@ class Point:
 
 
 @dataclass(eq=False)
-class Rows:
+class PointRows:
     """Arrays that the compiled march writes to, a point in each row."""
 
     joints: FloatArray
@@ -196,7 +196,7 @@ class Rows:
     mu: NDArray[np.complex128]
 
     @classmethod
-    def empty(cls, system: System, count: int, free: int = 1) -> Rows:
+    def empty(cls, system: System, count: int, free: int = 1) -> PointRows:
         """Return rows for points of a system with so many free parameters."""
         shape = (count, system.segments, 1 + len(system.model.states))
         labels = len(system.layout.labels)
@@ -223,9 +223,9 @@ class Rows:
         arrays = vars(self).values()
         return Points(*(arrays if stop is None else (a[:stop] for a in arrays)))
 
-    def first(self, count: int) -> Rows:
+    def first(self, count: int) -> PointRows:
         """Return the first rows."""
-        return Rows(*(array[:count].copy() for array in vars(self).values()))
+        return PointRows(*(array[:count].copy() for array in vars(self).values()))
 
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""

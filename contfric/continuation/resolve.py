@@ -9,6 +9,7 @@ from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
+from contfric.continuation.near_sliding_events import SAME_LOCATION
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.section_joints import (
     LAST_CROSSING,
@@ -19,7 +20,6 @@ from contfric.continuation.section_joints import (
 from contfric.continuation.side import Side
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.stopping import stop_between
-from contfric.continuation.told import SAME_LOCATION
 from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.orbit.orbit import Orbit
 

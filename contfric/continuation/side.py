@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from contfric.base.tally import tally
 from contfric.continuation.events import Bifurcation, End
-from contfric.continuation.points import SMALLEST_STEP, Point, Rows, Settings
+from contfric.continuation.points import SMALLEST_STEP, Point, PointRows, Settings
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.pace import Pace
@@ -114,7 +114,7 @@ class Side:
     first: Point
     end: End
     names: tuple[str, ...]
-    rows: Rows
+    rows: PointRows
     last: int = 0
     count: int = 1
     at_event: bool = False
@@ -130,7 +130,7 @@ class Side:
     @classmethod
     def starting(cls, point: Point, system: System, end: End, stability: bool) -> Side:
         """Return a side that consists of its first point."""
-        side = cls(point, end, kept(stability), Rows.empty(system, CHUNK))
+        side = cls(point, end, kept(stability), PointRows.empty(system, CHUNK))
         side.autonomous = system.model.autonomous
         side.rows.put(0, point)
         return side
@@ -276,7 +276,7 @@ def first_point(
     from contfric.orbit.convergence import ALONG
 
     direction = np.zeros_like(orbit.joints) if tangent is None else tangent
-    rows = Rows.empty(orbit.system, 1)
+    rows = PointRows.empty(orbit.system, 1)
     rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[orbit.model.index_of(settings.parameter)]
     rows.tangents[0], rows.directions[0] = direction, slope
     options, start = march_options(0.0, settings.largest, ALONG), rows.point(0).as_start()

@@ -19,10 +19,10 @@ from contfric.continuation.folds import (
     not_located,
 )
 from contfric.continuation.locate_change import locate_change, locate_label
+from contfric.continuation.near_sliding_events import NO_LENGTH, SAME_LOCATION, last_told
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.side import first_point
-from contfric.continuation.told import NO_LENGTH, SAME_LOCATION, last_told
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin

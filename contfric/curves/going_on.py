@@ -16,7 +16,7 @@ import numpy as np
 from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.points import EXTRA, Point, Rows
+from contfric.continuation.points import EXTRA, Point, PointRows
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Problem, problem_of, tangency
@@ -243,7 +243,7 @@ def _is_exit(problem: Problem, pinned: IntArray) -> bool:
 
 def _step_away(problem: Problem, start: Point, border: FloatArray, step: float) -> Point | None:
     """Return the point a step away from the first one, or None."""
-    rows = Rows.empty(problem.system, 2, 2)
+    rows = PointRows.empty(problem.system, 2, 2)
     rows.put(0, start)
     _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), step, step)
     return rows.point(1) if last == 1 else None

@@ -14,7 +14,7 @@ import numpy as np
 from contfric.base.tally import tally
 from contfric.continuation.hermite import cubic_between
 from contfric.continuation.locate_change import sought_of
-from contfric.continuation.points import Point, Rows
+from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import Conditioned, compiled_problem, solve_point
 from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
@@ -79,7 +79,7 @@ def locate(
     """Return the location of a change, and whether it is bracketed to its last digits; compiled."""
     from contfric.curves.bracket import locate_on_curve
 
-    rows = Rows.empty(problem.system, 4, 2)
+    rows = PointRows.empty(problem.system, 4, 2)
     rows.put(0, a)
     rows.put(1, b)
     compiled = compiled_problem(problem)

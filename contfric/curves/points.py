@@ -9,7 +9,7 @@ import numpy as np
 
 from contfric.base.interrupts import held_back
 from contfric.base.tally import tally
-from contfric.continuation.points import SMALLEST_STEP, Point, Rows
+from contfric.continuation.points import SMALLEST_STEP, Point, PointRows
 from contfric.curves.problem import Problem, border_of
 from contfric.curves.ranges import Ranges
 from contfric.curves.special import CurveEndReason
@@ -73,7 +73,7 @@ def compiled_problem(problem: Conditioned) -> CurveProblem:
 
 def march_rows(
     problem: Conditioned,
-    rows: Rows,
+    rows: PointRows,
     k: int,
     start: Point,
     taken: int,
@@ -107,7 +107,7 @@ def march_rows(
 class Marched(NamedTuple):
     """What one march has added: rows from ``first`` to ``stop``, why it stopped, and the next step."""
 
-    rows: Rows
+    rows: PointRows
     first: int
     stop: int
     why: int
@@ -125,7 +125,7 @@ def march_on(
     """March on from the last of the points of a curve; ``border`` is made to follow."""
     count = len(points)
     first = min(2, count)
-    rows = Rows.empty(problem.system, first + min(CHUNK, most - count), len(problem.which))
+    rows = PointRows.empty(problem.system, first + min(CHUNK, most - count), len(problem.which))
     for k in range(first):
         rows.put(k, points[count - first + k])
     why, last, step = march_rows(
@@ -159,7 +159,7 @@ def solve_point(
     """Solve for one point normal to a direction; ``border`` is made to follow it. None if Newton fails."""
     from contfric.continuation.march import BROKEN
 
-    rows = Rows.empty(problem.system, 1, len(w))
+    rows = PointRows.empty(problem.system, 1, len(w))
     rows.joints[0], rows.w[0] = joints, w
     rows.tangents[0], rows.directions[0] = tangent, slope
     why, _, _ = march_rows(problem, rows, -1, rows.point(0), 0, border, 0.0, 1.0)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from contfric.continuation.points import Point, Rows
+from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import solve_point
 from contfric.curves.ranges import Ranges, limits_of
 from contfric.curves.special import CurveEnd, CurveEndReason
@@ -259,7 +259,7 @@ class Held:
     def first(self) -> Point | None:
         """Return the point next to the orbit, with one of the parameters fixed: the last, if it goes."""
         widths, best, gap = self.box.widths, None, np.inf
-        empty = Rows.empty(self.orbit.system, 1, len(widths)).point(0)
+        empty = PointRows.empty(self.orbit.system, 1, len(widths)).point(0)
         here = replace(
             empty,
             joints=self.orbit.joints,

@@ -133,15 +133,15 @@ def still(mode, t, y, p, which, out, jac):  # type: ignore[no-untyped-def]
             jac[i, j] = 0.0
 
 
-class Kind(str, Enum):
+class FlowKind(str, Enum):
     """Which methods a model's solutions are found by: each kind has kernels of its own."""
 
     PLAIN = "plain"  # steps of the explicit method, and the closed form
     STIFF = "stiff"  # steps of either method, chosen on the way or always implicit
 
 
-_MEMBERS: dict[Kind, dict[str, Any]] = {
-    Kind.PLAIN: {
+_MEMBERS: dict[FlowKind, dict[str, Any]] = {
+    FlowKind.PLAIN: {
         "attempt": explicit_or_linear,
         "probe": explicit_or_linear_probe,
         "stages": 0,
@@ -149,7 +149,7 @@ _MEMBERS: dict[Kind, dict[str, Any]] = {
         "first": either_hit,
         "stationary": either_stationary,
     },
-    Kind.STIFF: {
+    FlowKind.STIFF: {
         "attempt": automatic,
         "probe": automatic_probe,
         "stages": IMPLICIT_STAGES,
@@ -161,13 +161,13 @@ _MEMBERS: dict[Kind, dict[str, Any]] = {
 
 
 @cache
-def handle_of(kind: Kind) -> HandleType:
+def handle_of(kind: FlowKind) -> HandleType:
     """Return the type of handles of models of one kind."""
     return HandleType(kind.value, MODEL, _MEMBERS[kind])
 
 
 @cache
-def kernels_of(kind: Kind) -> tuple[Kernel, Kernel, Kernel]:
+def kernels_of(kind: FlowKind) -> tuple[Kernel, Kernel, Kernel]:
     """Return the kernels ``flow``, ``hit`` and ``stationary`` of one kind."""
     handle, label = handle_of(kind), f"-{kind.value}"
     return (

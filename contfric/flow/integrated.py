@@ -37,7 +37,7 @@ import numpy as np
 
 from contfric.compiled import Kernel
 from contfric.flow.dop853 import POWER
-from contfric.flow.general import Kind, kernels_of, still
+from contfric.flow.general import FlowKind, kernels_of, still
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.kept import NUMBERS
@@ -129,9 +129,9 @@ class Functions:
             raise ValueError(f"modes in closed form need the explicit method, not '{method.value}'")
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> FlowKind:
         """Which kernels the solutions are found by."""
-        return Kind.PLAIN if Method(self.method) is Method.EXPLICIT else Kind.STIFF
+        return FlowKind.PLAIN if Method(self.method) is Method.EXPLICIT else FlowKind.STIFF
 
     def flow(self, level: Kernel | Bound, **others: Any) -> CompiledFlow:
         """Return the flow.

@@ -17,7 +17,7 @@ import sympy
 from contfric.models.affine import AffineForm
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
-from contfric.models.linear_code import Layout, LinearWriter, layout_of, places_of
+from contfric.models.linear_code import CoefficientLayout, LinearWriter, layout_of, places_of
 from contfric.models.motion import motion_code
 from contfric.models.symbols import Formulas, moves_in_closed_form
 
@@ -42,9 +42,9 @@ from contfric.compiled import (
 )
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.flow.layouts import AFFINE as SIGNATURES
-from contfric.models.unit import Unit
+from contfric.models.unit import GeneratedUnit
 
-unit = Unit(__name__, __file__)
+unit = GeneratedUnit(__name__, __file__)
 kernel, helper = unit.kernel, unit.helper
 
 
@@ -145,7 +145,7 @@ class _Writer:
         ]
         places = places_of(every)
 
-        def layouts(found: list[list[AffineForm] | str]) -> list[Layout | None]:
+        def layouts(found: list[list[AffineForm] | str]) -> list[CoefficientLayout | None]:
             return [None if isinstance(f, str) else layout_of(f, places) for f in found]
 
         pieces, seen = layouts(forms), layouts(sights)

@@ -30,7 +30,7 @@ Places = dict[Any, int]
 
 
 @dataclass(frozen=True)
-class Layout:
+class CoefficientLayout:
     """Where the coefficients of an affine piece, or observable, are in its vector.
 
     Attributes
@@ -50,7 +50,7 @@ class Layout:
         return self.slopes, self.waves
 
 
-def layout_of(rows: Sequence[AffineForm], places: Places) -> Layout:
+def layout_of(rows: Sequence[AffineForm], places: Places) -> CoefficientLayout:
     """Return the layout of some formulas."""
     slopes: list[tuple[int, int, int]] = []
     waves: list[tuple[int, int, int]] = []
@@ -64,7 +64,7 @@ def layout_of(rows: Sequence[AffineForm], places: Places) -> Layout:
         for w, a, b in row.waves:
             waves.append((i, places[w], len(values)))
             values += [a, b]
-    return Layout(tuple(slopes), tuple(waves), tuple(values))
+    return CoefficientLayout(tuple(slopes), tuple(waves), tuple(values))
 
 
 def places_of(forms: Sequence[AffineForm]) -> Places:
@@ -96,7 +96,10 @@ class LinearWriter:
         self.code, self.define, self.states, self.parameters = code, define, states, parameters
 
     def write(
-        self, pieces: Sequence[Layout | None], sights: Sequence[Layout | None], waves: Places
+        self,
+        pieces: Sequence[CoefficientLayout | None],
+        sights: Sequence[CoefficientLayout | None],
+        waves: Places,
     ) -> None:
         """Write all helpers; None stands for what is not affine."""
         self._values("frequencies(p, which, out, jac)", None, [tuple(waves)])
@@ -133,7 +136,11 @@ class LinearWriter:
         self._branches(index, blocks, write)
 
     def _blocks(
-        self, head: str, index: str, layouts: Sequence[Layout | None], lines: Callable[..., Any]
+        self,
+        head: str,
+        index: str,
+        layouts: Sequence[CoefficientLayout | None],
+        lines: Callable[..., Any],
     ) -> None:
         """Write lines that depend on the structure of a layout only."""
         self.define(head, [], _decorator(head))

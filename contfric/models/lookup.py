@@ -59,3 +59,7 @@ class Lookup:
     def reset_by_surface(self) -> dict[str, Reset]:
         """Resets by the names of their surfaces."""
         return {r.surface: r for r in self.resets}
+
+    def is_sliding(self, domain: str) -> bool:
+        """Return whether motion in a domain stays on a surface (a stick)."""
+        return self.mode_by_name[self.domain_by_name[domain].mode].sliding

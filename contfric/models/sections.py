@@ -70,7 +70,7 @@ def _joined(key: _Key) -> dict[str, str]:
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     acts = description.acts.items()
     mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
-    fields, going_on = _Fields(description), True
+    fields, going_on = _SampledFields(description), True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
@@ -129,7 +129,7 @@ def _between(
     return found
 
 
-class _Fields:
+class _SampledFields:
     """The fields of modes at some states, each evaluated once."""
 
     def __init__(self, description: Description) -> None:

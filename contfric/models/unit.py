@@ -78,7 +78,7 @@ class Formula(Kernel):
     unit : that it is compiled with
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Any, unit: Unit) -> None:
+    def __init__(self, function: Callable[..., Any], signature: Any, unit: GeneratedUnit) -> None:
         super().__init__(function, signature)
         self._unit = unit
 
@@ -97,7 +97,7 @@ class Formula(Kernel):
         return enter(block.address, arguments)
 
 
-class Unit(Kernel):
+class GeneratedUnit(Kernel):
     """The functions of a generated module.
 
     Parameters

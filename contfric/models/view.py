@@ -6,6 +6,7 @@ arrays to write to. Here the same functions take names and return what they find
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
+#: Steps of Newton's method onto surfaces: a dozen where it converges.
+_STEPS = 50
 #: Places for the stationary points of one segment: enough for nearly all, and where they are not.
 _MOST = (512, 65_536)
 
@@ -157,6 +160,26 @@ class FlowView:
             f"the stationary points of '{observable}' in mode '{mode}' were not all found within "
             f"{duration:g} from t = {t:g}: more than {_MOST[-1]}, or the search is too long"
         )
+
+    def landed(
+        self, surfaces: Sequence[str], t: float, y: FloatArray, within: float
+    ) -> FloatArray | None:
+        """Return a state on some surfaces, near another one, by Newton's method; None where none is found.
+
+        Parameters
+        ----------
+        within : heights above the surfaces that count as 0, for states of size 1
+        """
+        observables = [self.model.surface_by_name[name].observable for name in surfaces]
+        for _ in range(_STEPS):
+            missed = np.array([self.height(name, t, y) for name in surfaces])
+            if np.max(np.abs(missed)) <= within * (1.0 + np.max(np.abs(y))):
+                return y
+            slopes = np.array([self.gradient(name, t, y)[1:] for name in observables])
+            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
+                return None
+            y = y - np.linalg.lstsq(slopes, missed, rcond=None)[0]
+        return None
 
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the state after the reset at a surface, shape (n,)."""

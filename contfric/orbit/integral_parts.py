@@ -41,7 +41,7 @@ LOW, HIGH, DEPTH, LIGHT, EXACT, KNOWN, SIZES = range(7)
 _SUMMED = NODES * float(np.finfo(np.float64).eps)
 
 
-class Chain(NamedTuple):
+class NodeChain(NamedTuple):
     """The last node of a segment, from which the next one is reached; allocated once.
 
     Attributes
@@ -62,7 +62,7 @@ class Chain(NamedTuple):
     which: IntArray
 
 
-class Course(NamedTuple):
+class IntegralCourse(NamedTuple):
     """What is integrated over which segment.
 
     Attributes
@@ -103,8 +103,8 @@ class IntegralWorkspace(NamedTuple):
     """
 
     equations: EquationWorkspace
-    exact: Chain
-    light: Chain
+    exact: NodeChain
+    light: NodeChain
     values: FloatArray
     weights: FloatArray
     gradient: FloatArray
@@ -123,7 +123,7 @@ def chain_workspace(size, n, which, exact):  # type: ignore[no-untyped-def]
     """Return the workspace of a chain of nodes, for a tape of so many operations."""
     free = which.shape[0]
     rows, wide = (n, 2 + n + free) if exact else (0, 0)
-    return Chain(
+    return NodeChain(
         np.empty(1),
         np.empty(n),
         np.empty((rows, wide)),

@@ -34,7 +34,7 @@ from contfric.orbit.integral_parts import (
     LIGHT,
     LOW,
     SIZES,
-    Course,
+    IntegralCourse,
     add_part,
     integral_workspace,
     resolved,
@@ -225,7 +225,7 @@ def integrate(  # type: ignore[no-untyped-def]
     for k in range(2 * length):  # sizes of all segments are known before the first one is resolved
         i, joint = k % length, orbit.cycle[k % length]
         lasts = enter_segment(functions, whole, i, z, turn, joint, p, own)
-        course = Course(
+        course = IntegralCourse(
             functions, p, tape, extra, chained == 1, whole.modes[i], joint[0], own.begin, lasts
         )
         if not lasts > 0.0:

@@ -34,8 +34,8 @@ _SAME = 1e-9
 _MORE, _SETS = 4, 2
 #: What the second set is changed by: what vanishes at the defaults alone is an accident.
 _MOVED = 1.07
-#: Projections onto surfaces, and the distance that counts as on them.
-_STEPS, _ON = 50, 1e-11
+#: Distance from a surface that counts as on it.
+_ON = 1e-11
 #: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
 #: lose as many digits, twice: twelve are left.
 _SMALL = 1e-2
@@ -165,24 +165,10 @@ def _fields(
     wide = np.abs(model.spread(model.mapping(view.vector)))
     for _ in range(len(wide) + _MORE):
         t, y = float(draw.uniform(0.0, view.period or 10.0)), draw.uniform(-2.0, 2.0, len(wide))
-        landed = _landed(view, surfaces, t, wide * y)
+        landed = view.landed(surfaces, t, wide * y, _ON)
         if landed is not None:
             m = 1 + len(wide)  # the column of the duration
             yield (
                 view.jacobian(mode, t, landed, 0.0)[:, m],
                 view.jacobian(following, t, landed, 0.0)[:, m],
             )
-
-
-def _landed(view: FlowView, surfaces: list[str], t: float, y: FloatArray) -> FloatArray | None:
-    """Return a state on some surfaces, near another one, by projections; None where none is found."""
-    observables = [view.model.surface_by_name[s].observable for s in surfaces]
-    for _ in range(_STEPS):
-        missed = np.array([view.height(s, t, y) for s in surfaces])
-        if np.max(np.abs(missed)) <= _ON * (1.0 + np.max(np.abs(y))):
-            return y
-        slopes = np.array([view.gradient(o, t, y)[1:] for o in observables])
-        if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(missed))):
-            return None
-        y = y - np.linalg.lstsq(slopes, missed, rcond=None)[0]
-    return None

@@ -15,15 +15,7 @@ from contfric.models import Model
 from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor
 from contfric.plot.names import parameter_label, surface_label
-from contfric.plot.pieces import (
-    DomainPiece,
-    is_sliding,
-    level,
-    observe,
-    observe_gradient,
-    rest_bounds,
-    rest_limits,
-)
+from contfric.plot.pieces import DomainPiece, rest_bounds, rest_limits
 from contfric.plot.style import BLACK, GREY, SMALL, domain_colours, domain_labels, sized
 
 if TYPE_CHECKING:
@@ -44,7 +36,7 @@ def value_of(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
     if name not in names:
         valid = dict.fromkeys([*states, *names])
         raise ParameterError(f"no state or observable '{name}'{did_you_mean(name, valid)}")
-    return observe(orbit, name, time, state)
+    return orbit.flow.observe(name, time, state)
 
 
 def along(orbit: Orbit, pieces: Sequence[DomainPiece], name: str) -> list[FloatArray]:
@@ -87,7 +79,7 @@ def draw_levels(ax: Axes, orbit: Orbit, observable: str, *, vertical: bool) -> N
     for surface in orbit.model.surfaces:
         if surface.observable != observable:
             continue
-        value = level(orbit, surface)
+        value = orbit.flow.level(surface.name)
         section = surface.name in orbit.model.section_surfaces
         style = "-" if surface.switching or section else (0, (1.5, 1.5))
         draw = ax.axvline if vertical else ax.axhline
@@ -132,13 +124,13 @@ def draw_moving_surfaces(
     limits = np.array([ax.get_xlim(), ax.get_ylim()])
     spans, middle = np.ptp(limits, axis=1), limits.mean(axis=1)
     for piece in pieces:
-        if is_sliding(orbit.model, piece.domain):
+        if orbit.model.is_sliding(piece.domain):
             continue
         surface = orbit.model.surface_by_name[piece.exit]
         if surface.switching or surface.name in orbit.model.section_surfaces:
             continue
         time, state = float(piece.times[-1]), piece.states[-1]
-        slope = observe_gradient(orbit, surface.observable, time, state)[[i, j]] * spans
+        slope = orbit.flow.gradient(surface.observable, time, state)[[1 + i, 1 + j]] * spans
         if not np.any(slope):  # the surface is of a state that is not drawn
             continue
         tangent = np.array([-slope[1], slope[0]]) / np.hypot(*slope) * spans * 0.035
@@ -155,7 +147,7 @@ def draw_rest_bands(
 ) -> None:
     """Draw where a stick could rest on the axis, at the moment at which it begins."""
     for piece in pieces:
-        if not is_sliding(orbit.model, piece.domain):
+        if not orbit.model.is_sliding(piece.domain):
             continue
         limits = next(rest_bounds(orbit, across), None)
         if limits is None and across == orbit.model.states[0]:
@@ -231,6 +223,6 @@ def legend_handles(orbit: Orbit, pieces: Sequence[DomainPiece]) -> list[Line2D |
     ]
     kinds = {sticks for sticks, _ in _stops(orbit)}
     handles += [_stop_marker(sticks) for sticks in sorted(kinds, reverse=True)]
-    if any(is_sliding(model, name) for name in visited):
+    if any(model.is_sliding(name) for name in visited):
         handles.append(Patch(color=BAND, label="can rest here"))
     return handles

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.models import Model
-from contfric.models.definition import FloatArray, Surface
+from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
-
-#: Bisections of a crossing: to the resolution of any drawing.
-_BISECTIONS = 45
 
 
 @dataclass(frozen=True)
@@ -34,21 +31,6 @@ class DomainPiece:
     times: FloatArray
     states: FloatArray
     exit: str
-
-
-def observe(orbit: Orbit, name: str, time: float, state: FloatArray) -> float:
-    """Return the value of an observable."""
-    return orbit.flow.observe(name, time, state)
-
-
-def observe_gradient(orbit: Orbit, name: str, time: float, state: FloatArray) -> FloatArray:
-    """Return the derivatives of an observable with respect to the states, shape (n,)."""
-    return orbit.flow.gradient(name, time, state)[1:]
-
-
-def level(orbit: Orbit, surface: Surface) -> float:
-    """Return the level of the observable that makes the surface."""
-    return orbit.flow.level(surface.name)
 
 
 def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
@@ -80,33 +62,25 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
 
 def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
     """Return times at which transparent surfaces are crossed inside a segment, in order."""
+    from scipy.optimize import brentq
+
     found: list[tuple[float, str]] = []
     for surface in orbit.model.surfaces:
         if surface.switching and surface.name not in orbit.model.section_surfaces:
             continue
-        limit = level(orbit, surface)
-        gap = np.array(
-            [observe(orbit, surface.observable, t, y) for t, y in zip(times, states, strict=True)]
-        )
-        gap -= limit
+        name, limit = surface.name, orbit.flow.level(surface.name)
+        gap = np.array([orbit.flow.height(name, t, y) for t, y in zip(times, states, strict=True)])
         # a sample on the surface (a joint, or the middle of a solution) has no side
         sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
         for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):
             bracket = times[sided[k : k + 2]]
-            found.append((_crossing(orbit, surface.observable, limit, bracket), surface.name))
+            time = brentq(partial(_height, orbit, name), *bracket)
+            found.append((float(time), name))
     return sorted(found)
 
 
-def _crossing(orbit: Orbit, observable: str, limit: float, bracket: FloatArray) -> float:
-    low, high = float(bracket[0]), float(bracket[1])
-    sign = np.sign(observe(orbit, observable, low, orbit.state(low)) - limit)
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        if np.sign(observe(orbit, observable, middle, orbit.state(middle)) - limit) == sign:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+def _height(orbit: Orbit, surface: str, time: float) -> float:
+    return orbit.flow.height(surface, time, orbit.state(time))
 
 
 def _domain(orbit: Orbit, mode: str, time: float) -> str:
@@ -115,17 +89,12 @@ def _domain(orbit: Orbit, mode: str, time: float) -> str:
     model = orbit.model
     own = [d for d in model.domains if d.mode == model.whole_mode(mode)]
     side = {
-        s.name: np.sign(observe(orbit, s.observable, time, state) - level(orbit, s))
+        s.name: np.sign(orbit.flow.height(s.name, time, state))
         for s in model.surfaces
         if not s.switching or s.name in model.section_surfaces
     }
     fitting = [d for d in own if all(d.signs[name] == sign for name, sign in side.items())]
     return (fitting or own)[0].name
-
-
-def is_sliding(model: Model, domain: str) -> bool:
-    """Whether motion in a domain stays on a surface, such as a stick."""
-    return model.mode_by_name[model.domain_by_name[domain].mode].sliding
 
 
 def rest_limits(orbit: Orbit, piece: DomainPiece) -> tuple[float, float] | None:
@@ -143,8 +112,8 @@ def rest_limits(orbit: Orbit, piece: DomainPiece) -> tuple[float, float] | None:
         state = piece.states[0].copy()
         time = float(piece.times[0])
         for _ in range(4):
-            gap = observe(orbit, surface.observable, time, state) - level(orbit, surface)
-            slope = observe_gradient(orbit, surface.observable, time, state)[0]
+            gap = orbit.flow.height(surface.name, time, state)
+            slope = orbit.flow.gradient(surface.observable, time, state)[1]
             if slope == 0.0:
                 return None
             state[0] -= gap / slope
@@ -160,7 +129,7 @@ def rest_bounds(orbit: Orbit, observable: str) -> Iterator[tuple[float, float]]:
     for domain in model.domains:
         if not model.mode_by_name[domain.mode].sliding:
             continue
-        above = [level(orbit, s) for s in own if domain.signs[s.name] < 0]
-        below = [level(orbit, s) for s in own if domain.signs[s.name] > 0]
+        above = [orbit.flow.level(s.name) for s in own if domain.signs[s.name] < 0]
+        below = [orbit.flow.level(s.name) for s in own if domain.signs[s.name] > 0]
         if above and below:
             yield max(below), min(above)

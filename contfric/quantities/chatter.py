@@ -17,7 +17,7 @@ from contfric.errors import ContfricError
 if TYPE_CHECKING:
     from contfric.models.definition import FloatArray
     from contfric.models.parts import Chatter
-    from contfric.quantities.motion import Segment
+    from contfric.quantities.motion import MeasuredSegment
 
 #: Flights of lower speeds, as a share of the first, are left out: they change integrals by 1e-15.
 _SLOWEST = 1e-5
@@ -27,7 +27,7 @@ _NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
 
 
-def pieces(segment: Segment, own: Chatter) -> Iterator[Segment]:
+def pieces(segment: MeasuredSegment, own: Chatter) -> Iterator[MeasuredSegment]:
     """Yield the flights of a segment of chatter, then its contact."""
     model, vector = segment.model, segment.vector
     view = model.view(vector)
@@ -50,7 +50,9 @@ def pieces(segment: Segment, own: Chatter) -> Iterator[Segment]:
     yield _contact(part, segment)
 
 
-def _flight(part: Segment, mode: str, wall: str, lasts: float) -> tuple[Segment, Segment]:
+def _flight(
+    part: MeasuredSegment, mode: str, wall: str, lasts: float
+) -> tuple[MeasuredSegment, MeasuredSegment]:
     """Return one flight, and what follows the impact that ends it."""
     model, vector, n = part.model, part.vector, len(part.state)
     k, end = model.surface_index[wall], part.start + lasts
@@ -78,7 +80,9 @@ def _flight(part: Segment, mode: str, wall: str, lasts: float) -> tuple[Segment,
     return flight, following
 
 
-def _moved(part: Segment, mode: str, lasts: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _moved(
+    part: MeasuredSegment, mode: str, lasts: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the state after a duration that is fixed, how it moves, and its derivative by the duration."""
     n, every = len(part.state), np.arange(len(part.vector))
     out, jac = np.empty(n), np.empty((n, 2 + n + len(every)))
@@ -88,7 +92,7 @@ def _moved(part: Segment, mode: str, lasts: float) -> tuple[FloatArray, FloatArr
     return out, jac[:, : 1 + n] @ begin + jac[:, 2 + n :] @ part.d_vector, jac[:, 1 + n].copy()
 
 
-def _contact(part: Segment, whole: Segment) -> Segment:
+def _contact(part: MeasuredSegment, whole: MeasuredSegment) -> MeasuredSegment:
     """Return the contact, drawn back to where ``part`` starts: with derivatives the flow does that."""
     own = whole if whole.exact else _still(whole)
     state, moved, by_time = _moved(own, whole.mode, part.start - whole.start)
@@ -100,7 +104,7 @@ def _contact(part: Segment, whole: Segment) -> Segment:
     return replace(part, state=state, d_state=d_state, lasts=lasts, d_lasts=d_lasts)
 
 
-def _still(part: Segment) -> Segment:
+def _still(part: MeasuredSegment) -> MeasuredSegment:
     """Return a piece in one direction in which nothing moves."""
     return replace(
         part,

@@ -28,7 +28,7 @@ from contfric.models.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
 from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside
-from contfric.quantities.motion import Directions, IndexArray, Nodes, OrbitMotion, Place
+from contfric.quantities.motion import Directions, IndexArray, OrbitMotion, Place, SegmentNodes
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
@@ -341,7 +341,7 @@ def _turning(function: Function, motion: OrbitMotion, cycles: int, wave: str) ->
     return turning
 
 
-def _sharper(nodes: Nodes, share: float, function: Function) -> float:
+def _sharper(nodes: SegmentNodes, share: float, function: Function) -> float:
     """Return a stationary point by one step of Newton's method on the rate; as it was at a kink.
 
     The bend is a difference over shares as wide as it is the same on: a step that is not inside of them

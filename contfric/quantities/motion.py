@@ -133,7 +133,7 @@ def goes_on(model: Model) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Segment(Place):
+class MeasuredSegment(Place):
     """A smooth piece of an orbit; derivatives have D columns, none if they are not wanted.
 
     Attributes
@@ -169,13 +169,13 @@ class Segment(Place):
 class Pieces:
     """Segments of one orbit in arrays: their nodes are computed in one compiled call."""
 
-    segments: Sequence[Segment]
+    segments: Sequence[MeasuredSegment]
     _known: dict[tuple[bytes, bytes], tuple[Dual, list[Dual]]] = field(default_factory=dict)
 
-    def nodes(self, where: IndexArray) -> Nodes:
+    def nodes(self, where: IndexArray) -> SegmentNodes:
         """Return some shares of some segments as a place where functions are evaluated."""
         first, mode = self.segments[0], self.segments[int(where[0])].mode
-        return Nodes(first.model, first.vector, first.d_vector, mode, self, where)
+        return SegmentNodes(first.model, first.vector, first.d_vector, mode, self, where)
 
     def at(self, where: IndexArray, shares: FloatArray) -> tuple[Dual, list[Dual]]:
         """Return time and states at shares of the segments ``where``; the last direction is time."""
@@ -216,7 +216,7 @@ class Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class Nodes(Place):
+class SegmentNodes(Place):
     """Shares of several segments, those of ``where`` in turn."""
 
     model: Model
@@ -296,7 +296,7 @@ class OrbitMotion:
         return np.concatenate([first, other])
 
     @cached_property
-    def segments(self) -> tuple[Segment, ...]:
+    def segments(self) -> tuple[MeasuredSegment, ...]:
         """The smooth pieces of the whole orbit: its segments, and of chatter its flights."""
         chatters = self.orbit.model.chatter_by_mode
         if not chatters:
@@ -312,19 +312,19 @@ class OrbitMotion:
         """The same in arrays."""
         return Pieces(self.segments)
 
-    def last_of(self, index: int) -> Segment:
+    def last_of(self, index: int) -> MeasuredSegment:
         """Return the piece that ends with a segment of the orbit."""
         return next(s for s in reversed(self.segments) if s.index == index)
 
     @cached_property
-    def _whole_segments(self) -> tuple[Segment, ...]:
+    def _whole_segments(self) -> tuple[MeasuredSegment, ...]:
         orbit, moved = self.orbit, self.d_cycle
         ends = np.roll(moved[:, 0], -1, axis=0)
         ends[-1] += self.d_period
         found = []
         for i, (mode, _) in enumerate(orbit.itinerary):
             found.append(
-                Segment(
+                MeasuredSegment(
                     model=orbit.model,
                     vector=orbit.vector,
                     d_vector=self.d_vector,

@@ -21,7 +21,7 @@ import numpy as np
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray, Model
 from contfric.quantities.duals import Dual, Kinks
-from contfric.quantities.motion import IndexArray, Pieces, Place, Segment
+from contfric.quantities.motion import IndexArray, MeasuredSegment, Pieces, Place
 
 #: Nodes of a panel: a segment of half a period of the excitation is resolved by one panel, or two.
 NODES = 16
@@ -92,7 +92,7 @@ class ArgumentZero:
 class Resolved:
     """A function on a segment: its panels, and the cuts at kinks and jumps between them."""
 
-    segment: Segment
+    segment: MeasuredSegment
     function: Function
     what: str
     panels: list[Panel] = field(default_factory=list)
@@ -130,7 +130,7 @@ class Resolved:
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _PanelPart:
     """A part of a segment to resolve; ``before`` is the share of noise of the part that it is a half of."""
 
     index: int
@@ -227,8 +227,8 @@ def resolve(
     return found
 
 
-def _whole(pieces: Pieces) -> list[_Part]:
-    return [_Part(k, 0.0, 1.0) for k, s in enumerate(pieces.segments) if s.lasts > 0.0]
+def _whole(pieces: Pieces) -> list[_PanelPart]:
+    return [_PanelPart(k, 0.0, 1.0) for k, s in enumerate(pieces.segments) if s.lasts > 0.0]
 
 
 def _least(sampled: _Sampled) -> float:
@@ -238,7 +238,9 @@ def _least(sampled: _Sampled) -> float:
     return ROUNDING / RESOLVED * largest if np.isfinite(largest) else 0.0
 
 
-def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bool) -> _Sampled:
+def _sampled(
+    pieces: Pieces, function: Function, parts: list[_PanelPart], by_mode: bool
+) -> _Sampled:
     """Return a function at the nodes of some parts."""
     where = np.repeat(np.array([part.index for part in parts], dtype=np.int64), NODES)
     low, high = np.array([[part.low, part.high] for part in parts]).T[:, :, None]
@@ -263,8 +265,8 @@ def _sampled(pieces: Pieces, function: Function, parts: list[_Part], by_mode: bo
 
 
 def _judged(
-    found: Resolved, part: _Part, sampled: _Sampled, k: int, size: float, left: float
-) -> list[_Part]:
+    found: Resolved, part: _PanelPart, sampled: _Sampled, k: int, size: float, left: float
+) -> list[_PanelPart]:
     """Take a part as a panel, or return the parts that it is cut into; ``left`` is its share of noise."""
     segment, low, high = found.segment, part.low, part.high
     if not np.all(np.isfinite(sampled.sizes[k])):
@@ -277,8 +279,8 @@ def _judged(
     if cut is not None and low < cut.share < high:
         found.cuts.append(cut)
         return [
-            _Part(part.index, low, cut.share, part.depth, size),
-            _Part(part.index, cut.share, high, part.depth, size),
+            _PanelPart(part.index, low, cut.share, part.depth, size),
+            _PanelPart(part.index, cut.share, high, part.depth, size),
         ]
     level = resolved_level(segment.model)
     noise = part.depth >= HALVED and FALLS * part.before < left < NOISE
@@ -292,8 +294,8 @@ def _judged(
         )
     middle, depth = 0.5 * (low + high), part.depth + 1
     return [
-        _Part(part.index, low, middle, depth, size, left),
-        _Part(part.index, middle, high, depth, size, left),
+        _PanelPart(part.index, low, middle, depth, size, left),
+        _PanelPart(part.index, middle, high, depth, size, left),
     ]
 
 

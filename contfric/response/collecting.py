@@ -15,7 +15,7 @@ from contfric.response.cuts import (
     Cut,
     Ends,
     Following,
-    Points,
+    SectionPoints,
     empty_batch,
     empty_ends,
     empty_points,
@@ -44,7 +44,7 @@ def collect(
     starts: tuple[FloatArray, FloatArray, IntArray, IntArray],
     stop: IntArray | None = None,
     progress: Progress | None = None,
-) -> tuple[Points, Ends]:
+) -> tuple[SectionPoints, Ends]:
     """Follow solutions and return their points on a section, and what they came to.
 
     Parameters
@@ -109,7 +109,7 @@ def _fresh(model: Model, vector: FloatArray, otherwise: FloatArray) -> FloatArra
         return otherwise
 
 
-def _longer(points: Points) -> Points:
+def _longer(points: SectionPoints) -> SectionPoints:
     longer = empty_points(_GROWTH * len(points.times), points.states.shape[1])
     count = int(points.number[0])
     longer.number[0] = count

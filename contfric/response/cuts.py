@@ -53,7 +53,7 @@ class Following(NamedTuple):
     carried: int
 
 
-class Points(NamedTuple):
+class SectionPoints(NamedTuple):
     """Points on a section.
 
     Attributes
@@ -69,9 +69,9 @@ class Points(NamedTuple):
     times: FloatArray
     states: FloatArray
 
-    def first(self, count: int) -> Points:
+    def first(self, count: int) -> SectionPoints:
         """Return the first points, copied."""
-        return Points(
+        return SectionPoints(
             np.array([count]),
             self.cycles[:count].copy(),
             self.modes[:count].copy(),
@@ -109,9 +109,9 @@ class Ends(NamedTuple):
         )
 
 
-def empty_points(count: int, n: int) -> Points:
+def empty_points(count: int, n: int) -> SectionPoints:
     """Return empty rows for points."""
-    return Points(
+    return SectionPoints(
         np.zeros(1, dtype=np.int64),
         np.zeros(count, dtype=np.int64),
         np.zeros(count, dtype=np.int64),

@@ -17,7 +17,7 @@ from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
 from contfric.orbit.time_scale import clock_period
 from contfric.response.collecting import collect, repeats_of
-from contfric.response.cuts import Following, Points
+from contfric.response.cuts import Following, SectionPoints
 from contfric.response.outcome import Outcome
 from contfric.response.returns import Returns
 from contfric.response.sections import SectionLike, section_of, usual_section
@@ -85,7 +85,7 @@ def poincare(
     )
 
 
-def _repeated(model: Model, period: float, points: Points) -> bool:
+def _repeated(model: Model, period: float, points: SectionPoints) -> bool:
     """Tell whether the last points are those of a cycle before, to within rounding; the phase counts, too."""
     within, count = repeats_of(model), len(points.times)
 

@@ -30,8 +30,6 @@ from contfric.response.release_tile import ReleaseRows, ReleaseTile, compute_rel
 from contfric.response.returns import ReleaseMap
 from contfric.response.sweeping import compiled, positive
 
-#: Newton steps for the state at a release, from the origin; observables of friction are nearly linear.
-_STEPS = 30
 #: A release counts if the surfaces are met to this (relative to 1 + state).
 _MET = 1e-12
 #: Bytes of a release: its parameters, its events, its results.
@@ -189,30 +187,13 @@ def image_of(model: Model, release: _WayOutOfRest) -> tuple[int, int] | None:
     return model.mode_index[mode], model.surface_index[image]
 
 
-def _gap(
-    model: Model, vector: FloatArray, surface: int, t: float, y: FloatArray
-) -> tuple[float, FloatArray]:
-    """Return how far a state is from a surface, and its derivatives with respect to the state."""
-    flow, there = model.view(vector), model.surfaces[surface]
-    return flow.height(there.name, t, y), flow.gradient(there.observable, t, y)[1:]
-
-
 def _state_at(
     model: Model, vector: FloatArray, release: _WayOutOfRest, rests: str, t: float
 ) -> FloatArray:
     """Return the state at a release at a time: on both surfaces, by Newton's method, or nan."""
-    y = np.zeros(len(model.states))
-    pair = release.surface, model.surface_index[rests]
-    for _ in range(_STEPS):
-        gaps = [_gap(model, vector, k, t, y) for k in pair]
-        missed, slopes = np.array([g[0] for g in gaps]), np.array([g[1] for g in gaps])
-        if np.max(np.abs(missed)) <= _MET * (1.0 + np.max(np.abs(y))):
-            return y
-        try:
-            y = y - np.linalg.solve(slopes, missed)
-        except np.linalg.LinAlgError:
-            break
-    return np.full(len(y), np.nan)
+    names = model.surfaces[release.surface].name, rests
+    found = model.view(vector).landed(names, t, np.zeros(len(model.states)), _MET)
+    return np.full(len(model.states), np.nan) if found is None else found
 
 
 def _leaves(
@@ -239,11 +220,10 @@ def _shifts(
     image = image_of(model, release)
     if model.symmetry is None or image is None:
         return np.zeros(len(times))
+    view, names = model.view(vector), [model.surfaces[k].name for k in (release.surface, image[1])]
     rows = zip(times.tolist(), states, strict=True)
-    apart = [abs(_gap(model, vector, release.surface, t, y)[0]) for t, y in rows]
-    rows = zip(times.tolist(), states, strict=True)
-    other = [abs(_gap(model, vector, image[1], t, y)[0]) for t, y in rows]
-    return np.where(np.array(apart) <= np.array(other), 0.0, model.symmetry.fraction * period)
+    apart = np.abs([[view.height(name, t, y) for name in names] for t, y in rows]).reshape(-1, 2)
+    return np.where(apart[:, 0] <= apart[:, 1], 0.0, model.symmetry.fraction * period)
 
 
 def _branches(

@@ -32,12 +32,12 @@ from contfric.orbit.trajectory import (
     copy_state,
     follow,
 )
-from contfric.response.cuts import BATCH, Cut, Ends, Following, Points
+from contfric.response.cuts import BATCH, Cut, Ends, Following, SectionPoints
 from contfric.response.cutting import MEMORIES, cut_inside, cut_joint, new_workspace, set_strobe
 
 CutType = types.NamedTuple([table, indices, i8, i8, f8, i8], Cut)
 FollowingType = types.NamedTuple([f8, f8, f8, i8, i8], Following)
-PointsType = types.NamedTuple([indices, indices, indices, vector, matrix], Points)
+PointsType = types.NamedTuple([indices, indices, indices, vector, matrix], SectionPoints)
 EndsType = types.NamedTuple([indices, indices, indices, indices, matrix], Ends)
 
 #: Numbers of what a solution came to, in the order of :class:`contfric.response.outcome.Outcome`.

@@ -41,10 +41,10 @@ def every_kernel() -> dict[str, Kernel]:
     """Return the kernels of the package by the names of their folders in the cache."""
     from contfric.flow.chattering import KERNELS as CHATTERING
     from contfric.flow.coded.kernels import KERNELS as CODED
-    from contfric.flow.general import Kind, kernels_of
+    from contfric.flow.general import FlowKind, kernels_of
     from contfric.models.unit import callers
 
-    found = [kernel for kind in Kind for kernel in kernels_of(kind)]
+    found = [kernel for kind in FlowKind for kernel in kernels_of(kind)]
     found += [*CODED.values(), *CHATTERING.values(), *callers()]
     root = Path(__file__).parent.parent
     for file in package_files():

@@ -136,7 +136,7 @@ class Signature(Shown):
     def stops(self) -> int:
         """Number of sticks: segments of a sliding mode."""
         return sum(
-            is_sliding(self.model, segment) for segment in self.segments if not is_event(segment)
+            self.model.is_sliding(segment) for segment in self.segments if not is_event(segment)
         )
 
     @property
@@ -286,11 +286,6 @@ def _read_pair(model: object, segments: object) -> tuple[Model, tuple[str, ...]]
 
 def _is_model(value: object) -> bool:
     return isinstance(value, Model) or (isinstance(value, str) and value in model_names())
-
-
-def is_sliding(model: Model, domain: str) -> bool:
-    """Return whether motion in a domain stays on a surface (a stick)."""
-    return model.mode_by_name[model.domain_by_name[domain].mode].sliding
 
 
 def walk_fault(model: Model, segments: Sequence[str]) -> Fault | None:

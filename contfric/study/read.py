@@ -19,7 +19,7 @@ from contfric.signature import Signature, load_signature
 from contfric.study.drawings import Drawing, drawings_of
 from contfric.study.library import study_path
 from contfric.study.schema import SCHEMA, StudyFile
-from contfric.study.tasks.task import Asked
+from contfric.study.tasks.task import StudyCheck
 from contfric.study.wanted import Row, Want
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _checked(located: LocatedYaml, content: StudyFile) -> Study:
     alike = [task.name for task in content.given if task.result == "diagram"]
     if len(alike) > 1:
         located.fail((alike[-1],), f"a study has one of {' and '.join(alike)}, not both")
-    asked = Asked(located, content, model, params)
+    asked = StudyCheck(located, content, model, params)
     for task in [content.start, *content.given]:
         task.check(asked)
     _check_quantities(located, content, model)

@@ -18,7 +18,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
 import contfric as cf
-from contfric.continuation.points import Rows, Settings
+from contfric.continuation.points import PointRows, Settings
 from contfric.continuation.switching import leave_branch_point
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
@@ -464,7 +464,7 @@ def tangent_miss(found: cf.Curve, index: int) -> float:
     start, border = first
     sides = []
     for point in (start, start.reversed()):  # a step of the same length to each side
-        rows = Rows.empty(problem.system, 2, 2)
+        rows = PointRows.empty(problem.system, 2, 2)
         rows.put(0, point)
         _, last, _ = march_rows(problem, rows, 0, point, 0, border.copy(), 1e-4, 1e-4)
         assert last == 1

@@ -15,7 +15,7 @@ import contfric as cf
 from contfric.base.checked import write_sealed
 from contfric.compiled import f8, i8, matrix, types, vector
 from contfric.models.build import GeneratedFlow, coded_flow, load_module
-from contfric.models.unit import Formula, Unit
+from contfric.models.unit import Formula, GeneratedUnit
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Numbers of each kind that no function of a model has more of.
@@ -82,7 +82,7 @@ def written(tmp_path_factory):
     write_sealed(file, TEXT)
     names = {"TABLE": np.arange(1.0, 9.0)}
     exec(compile(TEXT, str(file), "exec"), names)
-    unit = Unit("functions_to_test", str(file))
+    unit = GeneratedUnit("functions_to_test", str(file))
     unit.tables["TABLE"] = names["TABLE"]
     unit.helper(f8(f8, i8))(names["inner"])
     kernels = {
@@ -114,7 +114,7 @@ def test_what_is_no_number_and_what_is_infinite(tmp_path):
     write_sealed(tmp_path / "beyond.py", text)
     names = {}
     exec(text, names)
-    f = Unit("beyond", str(tmp_path / "beyond.py")).kernel(f8(i8, f8))(names["f"])
+    f = GeneratedUnit("beyond", str(tmp_path / "beyond.py")).kernel(f8(i8, f8))(names["f"])
     assert (f(0, 0.0), f(0, -0.0), f(2, 0.0)) == (math.inf, -math.inf, -math.inf)
     assert math.isnan(f(1, -1.0))
     assert math.isnan(f(2, -1.0))

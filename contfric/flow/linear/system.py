@@ -48,7 +48,7 @@ def _terms(reach: float) -> int:
 _TABLE = np.array([_terms(j / _PARTS) for j in range(int(1.1 * REACH * _PARTS) + 2)])
 
 
-class System(NamedTuple):
+class LinearSystem(NamedTuple):
     """An affine mode at some parameters, with space for its series.
 
     Attributes
@@ -102,7 +102,7 @@ def system_in(coefficients, waves, rows, free):  # type: ignore[no-untyped-def]
         for j in range(waves.shape[1]):
             waves[k, j] = 0.0
     a = _WORK + TERMS + 1
-    return System(
+    return LinearSystem(
         coefficients[0],
         coefficients[1 : 1 + free],
         waves[0],

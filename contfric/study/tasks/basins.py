@@ -10,7 +10,7 @@ from pydantic import Field
 
 from contfric.base.shown import aligned
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import Asked, FigureKind, Job, axes_text, grid_text, incomplete
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck, axes_text, grid_text, incomplete
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
@@ -39,7 +39,7 @@ class BasinsTask(Response):
         None, ge=1, description="a whole number >= 1: periods that a start is followed"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the axes, and that every state has a value."""
         from contfric.response.basin_map import check_starts
 

@@ -12,7 +12,7 @@ from contfric.base.shown import aligned
 from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Job, incomplete
+from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -54,7 +54,7 @@ class EnsembleTask(Response):
     max_points: int | None = Field(None, ge=1, description="a whole number >= 1")
     workers: int | None = Field(None, ge=1, description="a whole number >= 1: processes")
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the range, the distributions and the quantity."""
         from contfric.ensembles.drawing import checked_distributions
         from contfric.quantities.registry import number_quantity

@@ -11,7 +11,7 @@ from contfric.base.shown import aligned
 from contfric.errors import checked_range
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Job, incomplete
+from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.equilibria.events import EquilibriumEvent
@@ -46,7 +46,7 @@ class EquilibriaTask(Response):
         description="a number in (0, 1]: largest step, as a share of the range",
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the parameter, its range, and that the model has formulas."""
         asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
         asked.attempt((self.name, "range"), lambda: checked_range(self.parameter, self.range))

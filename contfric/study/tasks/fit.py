@@ -13,7 +13,7 @@ from contfric.base.yaml_schema import SchemaPart, keys_of
 from contfric.errors import ParameterError, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import Asked, FigureKind, Job
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -104,7 +104,7 @@ class FitTask(Response):
         min_length=1, description=f"a list of measurements, each {keys_of(DatumPart)}"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the measurements, but for events, which are not known yet."""
         from contfric.fitting.fit import check_fit
 

@@ -12,9 +12,9 @@ from pydantic import Field
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import (
     STATE,
-    Asked,
     FigureKind,
     Job,
+    StudyCheck,
     axes_text,
     grid_text,
     incomplete,
@@ -57,7 +57,7 @@ class LyapunovTask(Response):
     )
     state: list[float] | None = Field(None, description=f"{STATE}: where every trajectory starts")
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the axes, the state, and whether the map fits into memory."""
         from contfric.chaos.compute import check_size
 

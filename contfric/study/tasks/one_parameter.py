@@ -10,7 +10,7 @@ from pydantic import Field
 from contfric.study.tables import Table, points
 from contfric.study.tasks.diagram_record import entries_of, lines_of
 from contfric.study.tasks.orbit import POINTS, points_text
-from contfric.study.tasks.task import PARAMETER, RANGE, Asked, FigureKind, Found, Task
+from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Found, StudyCheck, Task
 from contfric.study.wanted import Want, row_name
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class OneParameter(Task):
         """The ends of the range."""
         return self.range[0], self.range[1]
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the parameter, and its range against the start and the model."""
         asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
         fault = _range_fault(asked.model, asked.params, self)

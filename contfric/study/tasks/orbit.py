@@ -9,7 +9,7 @@ from pydantic import Field
 
 from contfric.base.yaml_schema import SchemaPart, keys_of
 from contfric.study.tables import Table, points
-from contfric.study.tasks.task import STATE, Asked, FigureKind, Found, Job, Skipped, Task
+from contfric.study.tasks.task import STATE, FigureKind, Found, Job, Skipped, StudyCheck, Task
 from contfric.study.wanted import COLUMNS
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Start(Task):
     )
     orbit: str | None = Field(None, min_length=1, description="the path of a saved orbit (.npz)")
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Refuse two origins, and a state of another model."""
         given = [k for k in ("simulate", "signature", "orbit") if getattr(self, k) is not None]
         if len(given) != 1:

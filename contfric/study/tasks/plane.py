@@ -10,7 +10,7 @@ from pydantic import Field
 from contfric.base.yaml_schema import keys_of
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
-from contfric.study.tasks.task import Asked, FigureKind, Found, Job, SeedsEntry, Task
+from contfric.study.tasks.task import FigureKind, Found, Job, SeedsEntry, StudyCheck, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +65,7 @@ class PlaneTask(Task):
         None, ge=1, description="a whole number >= 1: most sections, those of the study among them"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check ranges, sections and kinds."""
         from contfric.continuation.events import Kind
         from contfric.curves.ranges import box_of
@@ -84,7 +84,7 @@ class PlaneTask(Task):
                 text = f"no curves of '{kind}'{did_you_mean(kind, known)}"
                 asked.fail(("plane", "kinds"), text)
 
-    def _check_sections(self, asked: Asked, ranges: dict[str, tuple[float, float]]) -> None:
+    def _check_sections(self, asked: StudyCheck, ranges: dict[str, tuple[float, float]]) -> None:
         for name, values in (self.sections or {}).items():
             if name not in ranges:
                 text = f"'{name}' is not one of the two parameters{did_you_mean(name, ranges)}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import Asked, FigureKind, Found, Job
+from contfric.study.tasks.task import FigureKind, Found, Job, StudyCheck
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ class QuantityCurveTask(Response):
         None, ge=2, description="a whole number >= 2: most points of each side"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the quantity, the parameters and their ranges."""
         from contfric.curves.ranges import ranges_of
         from contfric.quantities.registry import number_quantity

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import Asked, FigureKind, Job
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck
 
 if TYPE_CHECKING:
     from contfric.response.returns import ReleaseMap
@@ -33,7 +33,7 @@ class ReleaseMapTask(Response):
         None, gt=0.0, description="a number > 0: periods within which the next release has to come"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check that releases of the model are told by their phase, and the surface."""
         from contfric.response.release import release_of
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from contfric.study.tasks.task import STATE, Asked, Found, Task
+from contfric.study.tasks.task import STATE, Found, StudyCheck, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,7 @@ class SectionTask(Response):
         None, ge=0.0, description="a number >= 0: periods before points are collected"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the state and the section."""
         from contfric.response.sections import section_of, usual_section
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import Asked, FigureKind, Found, Job
+from contfric.study.tasks.task import FigureKind, Found, Job, StudyCheck
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,7 +40,7 @@ class StableSetTask(Response):
         None, ge=2, description="a whole number >= 2: most points of each half"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check the model and the ranges."""
         from contfric.response.stable_set import check_ranges
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from contfric.study.tasks.response import SectionTask
-from contfric.study.tasks.task import PARAMETER, Asked, FigureKind, Job, incomplete
+from contfric.study.tasks.task import PARAMETER, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
@@ -43,7 +43,7 @@ class SweepTask(SectionTask):
         None, description="one of both, up, down"
     )
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check state, section, parameter and values."""
         super().check(asked)
         asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))

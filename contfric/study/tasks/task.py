@@ -77,7 +77,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Asked:
+class StudyCheck:
     """What a task is checked against while a study is read.
 
     Attributes
@@ -157,7 +157,7 @@ class Task(SchemaPart):
 
     # ------------------------------------------------------------------------------ reading, plan
 
-    def check(self, asked: Asked) -> None:
+    def check(self, asked: StudyCheck) -> None:
         """Check what the schema cannot know; a mistake fails with its line."""
 
     def does(self, study: Study) -> str:
