@@ -183,6 +183,24 @@ def test_a_bridge_without_damping_ends_where_its_end_is_known() -> None:
         assert not branch.bridge or all(event.accuracy < 1.0 for event in ends)
 
 
+def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_units() -> None:
+    """Two bridges that pass one rest are run through one after the other: its ends are singular twice.
+
+    They are known to a share of the range, which is narrow: a bridge that is narrower than that share as a
+    number is wide enough.
+    """
+    found = restarts.scene(43, 23)
+    for name, share in (("S0", 0.0), ("S0", 1e-3), ("h", -1e-3)):
+        params = {**found.params, name: found.params[name] * (1.0 + share)}
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range, max_periods=2)
+        assert explored.complete and not explored.loose_ends, (name, share)
+        balances = explored.verify(restarts=0).balances
+        assert len(balances) > 10 and all(balance.holds for balance in balances)
+        both = [b for b in explored.branches if len(b.system.holds) == 3 and not b.system.half]
+        assert any(np.ptp(branch.values) < 1e-5 for branch in both)
+
+
 def test_orbits_on_a_curve_that_turns() -> None:
     """Through folds: both sides are solved, and the parameter is on one side of the fold."""
     checked = 0
