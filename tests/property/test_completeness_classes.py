@@ -14,6 +14,7 @@ import restarts
 from report import Tally
 
 import contfric as cf
+from contfric.atlas.faults import fault_of
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
@@ -197,8 +198,16 @@ def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_
         assert explored.complete and not explored.loose_ends, (name, share)
         balances = explored.verify(restarts=0).balances
         assert len(balances) > 10 and all(balance.holds for balance in balances)
-        both = [b for b in explored.branches if len(b.system.holds) == 3 and not b.system.half]
-        assert any(np.ptp(branch.values) < 1e-5 for branch in both)
+        width = found.range[1] - found.range[0]
+        narrow = [
+            cf.continue_orbit(branch[len(branch) // 2], found.vary, found.range)
+            for branch in explored.branches
+            if len(branch.system.holds) == 3 and np.ptp(branch.values) < 1e-5
+        ]
+        assert narrow and all(fault_of(branch, width) is None for branch in narrow)
+        known = [max(e.bifurcation.accuracy for e in b.ends if e.bifurcation) for b in narrow]
+        own = [float(np.ptp(branch.values)) for branch in narrow]
+        assert any(w * width < o < w for w, o in zip(known, own, strict=True)), (known, own)
 
 
 def test_orbits_on_a_curve_that_turns() -> None:
