@@ -42,7 +42,7 @@ def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str
         state.judge(event, reason, Verdict.KNOWN, known)
         return True
     branch = follow_family(family, state.settings, state.progress)
-    if branch is None or fault_of(branch):
+    if branch is None or fault_of(branch, state.settings.width):
         return False
     kinds = TERMINAL if event.bifurcation.kind in TERMINAL else frozenset({Kind.BP})
     ends = [end for end in branch.ends if meets(end, event, state.settings, kinds)]
@@ -75,7 +75,7 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
                 continue
             branch = whole_branch(shortest(near), state.settings)
             ends = [end for end in branch.ends if meets(end, event, state.settings)]
-            if ends and not fault_of(branch):
+            if ends and not fault_of(branch, state.settings.width):
                 state.accept(event, candidate.reason, branch)
                 for end in ends:
                     state.merge(event, end)

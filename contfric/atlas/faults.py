@@ -37,8 +37,10 @@ def fault_of_itinerary(orbit: Orbit) -> str | None:
     return ONLY_GROWS if only_grows(orbit.model, orbit.as_whole().itinerary) else None
 
 
-def fault_of(branch: Branch) -> str | None:
-    """Return what is wrong with a branch; None if nothing is."""
+def fault_of(branch: Branch, width: float) -> str | None:
+    """Return what is wrong with a branch; None if nothing is. ``width`` is that of the parameter's range."""
+    if _undetermined(branch, width):
+        return "rounding leaves no place of its end in the range: its equations are singular there"
     return next((why for is_so, why in _FAULTS if is_so(branch)), None)
 
 
@@ -118,17 +120,18 @@ def _is_symmetric(branch: Branch) -> bool:
     return sum(branch[k].symmetric for k in asked) > len(asked) / 2
 
 
-def _undetermined(branch: Branch) -> bool:
+def _undetermined(branch: Branch, width: float) -> bool:
     """Tell whether a narrow bridge ends where rounding leaves no location of the event within its own width.
 
     Its equations are singular there. Such a bridge is one of many that a continuum of holds without damping
     seems to consist of: each begins and ends where rounding has it. A wide one is known by its points, and
     an event that is known better than to the root of rounding is regular.
     """
-    width = float(np.ptp(branch.values))
-    narrow = width < _NARROW * (1.0 + np.max(np.abs(branch.values)))
-    ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
-    return bool(branch.bridge and narrow and any(b.accuracy > max(ROUGH, width) for b in ends))
+    own = float(np.ptp(branch.values))
+    if not branch.bridge or own >= _NARROW * (1.0 + np.max(np.abs(branch.values))):
+        return False
+    known = [end.bifurcation.accuracy for end in branch.ends if end.bifurcation is not None]
+    return any(accuracy > ROUGH and accuracy * width > own for accuracy in known)
 
 
 def _violates(branch: Branch) -> bool:
@@ -158,8 +161,4 @@ _FAULTS = (
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),
-    (
-        _undetermined,
-        "rounding leaves no place of its end in the range: its equations are singular there",
-    ),
 )

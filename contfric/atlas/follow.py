@@ -162,7 +162,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             continue
         branch = _through(state, guess)
         ends = [] if branch is None else [e for e in branch.ends if meets(e, event, settings)]
-        if branch is None or not ends or fault_of(branch):
+        if branch is None or not ends or fault_of(branch, state.settings.width):
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
@@ -218,7 +218,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         assert candidate.orbit is not None
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
-    fault = None if branch is None else fault_of(branch)
+    fault = None if branch is None else fault_of(branch, state.settings.width)
     if fault is not None:
         state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)
         return False
@@ -265,7 +265,11 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     # one that begins outside needs its own location, even if the event is known as well
     least = ACCURACY if outside else min(known, ACCURACY)
     better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= least]
-    return (whole, better[:1]) if better and not fault_of(whole) else (branch, [])
+    return (
+        (whole, better[:1])
+        if better and not fault_of(whole, state.settings.width)
+        else (branch, [])
+    )
 
 
 def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> bool:

@@ -14,6 +14,7 @@ import restarts
 from report import Tally
 
 import contfric as cf
+from contfric.atlas.faults import fault_of
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
@@ -181,6 +182,32 @@ def test_a_bridge_without_damping_ends_where_its_end_is_known() -> None:
     for branch in found.branches:
         ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
         assert not branch.bridge or all(event.accuracy < 1.0 for event in ends)
+
+
+def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_units() -> None:
+    """Two bridges that pass one rest are run through one after the other: its ends are singular twice.
+
+    They are known to a share of the range, which is narrow: a bridge that is narrower than that share as a
+    number is wide enough.
+    """
+    found = restarts.scene(43, 23)
+    for name, share in (("S0", 0.0), ("S0", 1e-3), ("h", -1e-3)):
+        params = {**found.params, name: found.params[name] * (1.0 + share)}
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range, max_periods=2)
+        assert explored.complete and not explored.loose_ends, (name, share)
+        balances = explored.verify(restarts=0).balances
+        assert len(balances) > 10 and all(balance.holds for balance in balances)
+        width = found.range[1] - found.range[0]
+        narrow = [
+            cf.continue_orbit(branch[len(branch) // 2], found.vary, found.range)
+            for branch in explored.branches
+            if len(branch.system.holds) == 3 and np.ptp(branch.values) < 1e-5
+        ]
+        assert narrow and all(fault_of(branch, width) is None for branch in narrow)
+        known = [max(e.bifurcation.accuracy for e in b.ends if e.bifurcation) for b in narrow]
+        own = [float(np.ptp(branch.values)) for branch in narrow]
+        assert any(w * width < o < w for w, o in zip(known, own, strict=True)), (known, own)
 
 
 def test_orbits_on_a_curve_that_turns() -> None:
