@@ -262,7 +262,8 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     known = event.bifurcation.accuracy
     outside = branch[0].margins.min(initial=0.0) < -_OUTSIDE
     elsewhere = (known > ACCURACY or outside) and not branch.bridge
-    if branch.arc[-1] < _NOWHERE_ROUGHLY or not (elsewhere or _may_have_passed(branch, known * state.settings.width)):
+    passed = elsewhere or _may_have_passed(branch, known * state.settings.width)
+    if branch.arc[-1] < _NOWHERE_ROUGHLY or not passed:
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
     if not elsewhere and len(whole.bifurcations) <= len(branch.bifurcations):
@@ -276,8 +277,9 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
 def _may_have_passed(branch: Branch, known: float) -> bool:
     """Tell whether a branch may have an event before the first point that was solved for away from its start.
 
-    As far as ``LEAVE`` a branch is a parabola. Farther a fold may be passed, and one is passed for certain where
-    the parameter goes back the way that it has come, by more than its value at the event is ``known`` to.
+    As far as ``LEAVE`` a branch is a parabola. Farther a fold may be passed, and one is passed for certain
+    where the parameter goes back the way that it has come, by more than its value at the event is ``known``
+    to.
     """
     if branch.arc[1] > LEAVE:
         return True
