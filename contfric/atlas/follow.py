@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+
 from contfric.atlas.collect import Event
 from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
@@ -36,6 +38,7 @@ from contfric.continuation.events import ACCURACY, TERMINAL, End, EndReason, Kin
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import Settings, next_to
+from contfric.continuation.switching import LEAVE
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
@@ -254,22 +257,37 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
 
     Where the equations of the branch that arrives are singular at its end, those of another one need not be.
     From a location off by the root of rounding that one begins outside of its conditions: that is seen of it
-    however well the event seems to be known.
+    however well the event seems to be known. What begins too far from the event may have passed another one.
     """
     known = event.bifurcation.accuracy
     outside = branch[0].margins.min(initial=0.0) < -_OUTSIDE
-    if not (known > ACCURACY or outside) or branch.bridge or branch.arc[-1] < _NOWHERE_ROUGHLY:
+    elsewhere = (known > ACCURACY or outside) and not branch.bridge
+    passed = elsewhere or _may_have_passed(branch, known * state.settings.width)
+    if branch.arc[-1] < _NOWHERE_ROUGHLY or not passed:
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
+    if not elsewhere and len(whole.bifurcations) <= len(branch.bifurcations):
+        return branch, []
     ends = [end for end in whole.ends if meets(end, event, state.settings)]
-    # one that begins outside needs its own location, even if the event is known as well
-    least = ACCURACY if outside else min(known, ACCURACY)
-    better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= least]
-    return (
-        (whole, better[:1])
-        if better and not fault_of(whole, state.settings.width)
-        else (branch, [])
-    )
+    # what begins outside or too far needs its own location, even if the event is known as well
+    better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= ACCURACY]
+    located = better and not fault_of(whole, state.settings.width)
+    return (whole, better[:1]) if located else (branch, [])
+
+
+def _may_have_passed(branch: Branch, known: float) -> bool:
+    """Tell whether a branch may have an event before the first point that was solved for away from its start.
+
+    As far as ``LEAVE`` a branch is a parabola. Farther a fold may be passed, and one is passed for certain
+    where the parameter goes back the way that it has come, by more than its value at the event is ``known``
+    to.
+    """
+    if branch.arc[1] > LEAVE:
+        return True
+    if len(branch) < 3 or any(0.0 < b.position <= branch.arc[2] for b in branch.bifurcations):
+        return False
+    moved = np.diff(branch.values[:3])
+    return bool(moved[0] * moved[1] < 0.0 and np.abs(moved).min() > known)
 
 
 def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> bool:

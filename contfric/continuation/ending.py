@@ -205,13 +205,13 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     continuous = f"{kind.meaning}: the signature changes, the solution is continuous"
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
-    for location in locations_of(bifurcation)[:1]:
+    for location in locations_of(bifurcation)[: None if orbit.model.filippov else 1]:
         try:
             outcome_at(orbit.as_whole(), location, kind)
         except NoJump:
             return continuous
-        except NotationError:
-            return ""
+        except NotationError:  # where nothing jumps: what is next to it, and is told of that
+            continue
         if orbit.model.filippov:
             return continuous
     return ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Itinerary
@@ -99,8 +100,24 @@ def stationary_points(orbit: Orbit) -> FloatArray:
             _, values = orbit.flow.stationary(*segment)
         x += [*values.tolist(), float(end[1])]
         struck += [False] * len(values) + [model.reset_at(mode, exit_) is not None]
-    before, after = np.roll(x, 1) - x, np.roll(x, -1) - x
-    return np.asarray(np.array(x)[(before * after > 0.0) | np.array(struck)])
+    size = 1.0 + float(np.max(np.abs(x)))
+    return _extrema(np.array(x), np.array(struck), _AT_JOINT * size)
+
+
+def _extrema(x: FloatArray, struck: NDArray[np.bool_], known: float) -> FloatArray:
+    """Return the local extrema of a cyclic sequence, and the values at impacts.
+
+    Neighbours that differ by less than they are known to are one: where a mass rests, or slides along a
+    surface, the differences of its displacement have no sign.
+    """
+    first = np.flatnonzero(np.abs(x - np.roll(x, 1)) > known)
+    if not len(first):
+        return x[struck]
+    x, struck = np.roll(x, -first[0]), np.roll(struck, -first[0])
+    first -= first[0]
+    levels, met = x[first], np.logical_or.reduceat(struck, first)
+    before, after = np.roll(levels, 1) - levels, np.roll(levels, -1) - levels
+    return np.asarray(levels[(before * after > 0.0) | met])
 
 
 def reach_of(orbit: Orbit) -> tuple[float, float]:
