@@ -138,9 +138,7 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
     orbit, away = _without_sections(orbit, away)
     if not np.any(away):
         return Candidate(reason, orbit, itineraries=itineraries)
-    moves = np.zeros(orbit.joints.shape)
-    moves[:, 0] = away
-    return Candidate(reason, orbit, away=moves, itineraries=itineraries)
+    return Candidate(reason, orbit, away=_along_motion(orbit, away), itineraries=itineraries)
 
 
 def _without_sections(orbit: Orbit, away: FloatArray) -> tuple[Orbit, FloatArray]:
@@ -187,9 +185,21 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
         edited, moves = replace(edited, system=part, joints=joints), moves[: len(half)]
     if not np.any(moves):
         return edited, None
-    away = np.zeros(edited.joints.shape)
-    away[:, 0] = moves
-    return edited, away
+    return edited, _along_motion(edited, moves)
+
+
+def _along_motion(orbit: Orbit, away: FloatArray) -> FloatArray:
+    """Return how joints move, states with times: where one part rests others go on, and a belt with it.
+
+    What comes in has no length, and begins with the rate of the solution.
+    """
+    n = orbit.joints.shape[1] - 1
+    moves = np.zeros(orbit.joints.shape)
+    for k in np.flatnonzero(away):
+        time, state = float(orbit.joints[k, 0]), orbit.joints[k, 1:]
+        rate = orbit.flow.jacobian(orbit.system.itinerary[k][0], time, state, 0.0)[:, 1 + n]
+        moves[k] = away[k] * np.concatenate([[1.0], rate])
+    return moves
 
 
 def directions(orbit: Orbit, active: int) -> Iterator[tuple[FloatArray | None, float]]:

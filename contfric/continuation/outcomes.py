@@ -378,11 +378,19 @@ def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray)
 
 
 def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
-    """Check that a state lies inside the region of a rest, not on its boundary."""
+    """Check that a state lies inside the region of a rest, not on its boundary.
+
+    A surface on which the state lies does not bound it where both of its sides are of the rest: where a mass
+    rests that a gap ends at, the rate of that gap is zero.
+    """
     model = orbit.model
     location = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
-    for domain in model.domains_of(rest):
-        if all(location[s] == sign for s, sign in domain.signs.items() if sign != 0):
+    own = [domain.signs for domain in model.domains_of(rest)]
+    for signs in own:
+        sides = {s: sign for s, sign in signs.items() if sign != 0}
+        met = [s for s in sides if location[s] == 0]
+        inside = all(location[s] in (side, 0) for s, side in sides.items())
+        if inside and all({**signs, s: -sides[s]} in own for s in met):
             return
     raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
 

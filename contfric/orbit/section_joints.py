@@ -14,6 +14,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import is_smooth
+from contfric.orbit.slides import SHORT, time_unit
 from contfric.orbit.system import build_system
 
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
@@ -23,18 +24,26 @@ _AS_FAST = 1e-6
 
 
 def divided(whole: Orbit, turns: int) -> Orbit | None:
-    """Return a whole orbit with joints on a section too, where all of it is in one mode.
+    """Return a whole orbit with joints on a section too, where all of it that lasts is in one mode.
 
     One each way in each of the equal ``turns`` of the motion. None where there is no section, or where it is
     of no use.
     """
-    model, mode = whole.model, whole.model.whole_mode(whole.itinerary[0][0])
+    model = whole.model
+    lasts = whole.ends[:, 0] - whole.cycle[:, 0]
+    lasting = {
+        model.whole_mode(mode)
+        for (mode, _), last in zip(whole.itinerary, lasts, strict=True)
+        if last > SHORT * time_unit(whole)
+    }
+    if len(lasting) != 1 or is_smooth(model, whole.itinerary):
+        return None
+    (mode,) = lasting
     sections = {s for part, s in model.sections if model.whole_mode(part) == mode}
-    others = [pair for pair in whole.itinerary if model.whole_mode(pair[0]) != mode]
-    if not sections or others or whole.system.holds or is_smooth(model, whole.itinerary):
+    if not sections:
         return None
     surface = min(sections, key=model.surface_index.__getitem__)
-    chosen = _by_turns(whole, surface, turns)
+    chosen = _by_turns(whole, mode, surface, turns)
     if not chosen:
         return None
     pairs = {-side: pair for side, pair in model.section_pairs(mode, surface).items()}
@@ -67,9 +76,10 @@ class _Crossing:
         return 1 if self.rate > 0.0 else -1
 
 
-def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
-    """Return the fastest crossings of a surface, one each way in each turn."""
-    every = [c for i in range(len(whole.itinerary)) for c in _inside(whole, i, surface)]
+def _by_turns(whole: Orbit, mode: str, surface: str, turns: int) -> list[_Crossing]:
+    """Return the fastest crossings of a surface in a mode, one each way in each turn."""
+    own = [i for i, (part, _) in enumerate(whole.itinerary) if whole.model.whole_mode(part) == mode]
+    every = [c for i in own for c in _inside(whole, i, surface)]
     ways = {way: [c for c in every if c.way == way] for way in (-1, 1)}
     if not all(ways.values()):
         return []
