@@ -100,7 +100,8 @@ def begin(solutions, k, cell, start, y, p, limits, workspaces):  # type: ignore[
         workspaces.transit.y[j] = y[j]
     for j in range(p.shape[0]):
         solutions.p[k, j] = p[j]
-    workspaces.transit.at_once[0], workspaces.transit.at_once[2] = 0, 0
+    for j in (0, 2, 3):
+        workspaces.transit.at_once[j] = 0
     seed(workspaces.frame, 0)
     forget(workspaces.memory)
     clear(workspaces.averages)

@@ -206,7 +206,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
     """
     transit, z, images, frame = cycle.transit, cycle.z, cycle.images, cycle.frame
     n = transit.y.shape[0]
-    transit.at_once[0] = 0
+    transit.at_once[0] = transit.at_once[3] = 0
     t, turns, rank, lasted = z[0], 0, n, 0.0
     for i in range(n + 1):
         for j in range(n + 1):

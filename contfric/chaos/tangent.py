@@ -36,6 +36,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
+from contfric.orbit.resting import still_bounced
 from contfric.orbit.sides import mode_after, sign_code
 from contfric.orbit.system import IntArray
 from contfric.orbit.together import mode_together
@@ -75,7 +76,8 @@ class Transit(NamedTuple):
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : workspace for a state and for the image of a perturbation, shape (n,)
     at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
-        plus 2 if it has resets; whether there was an impact among those events; shape (3,)
+        plus 2 if it has resets; whether there was an impact among those events; 1 + the wall that was met
+        last if impacts go on alike since, and how many to come are known not to lead to rest; shape (5,)
     ahead, meets : duration of the next segment and the surface that ends it, where they are known beforehand,
         with the state there and the derivatives; else SINGLY as the surface; shapes (1,)
     """
@@ -101,7 +103,7 @@ def new_transit(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
-        np.zeros(3, dtype=np.int64),
+        np.zeros(5, dtype=np.int64),
         np.zeros(1),
         np.full(1, SINGLY),
     )
@@ -184,12 +186,18 @@ def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # 
             )
             chatter = tables.chatters[following, surface] if reset else -1
             if chatter >= 0:
-                copy_state(workspace.after, transit.end)
-                if pressed or leads_to_rest(
-                    functions, tables, chatter, surface, t, y, p, period, workspace
-                ):
+                transit.at_once[4] -= 1
+                anew = transit.at_once[3] != 1 + surface or transit.at_once[4] <= 0
+                if anew and not pressed:
+                    copy_state(workspace.after, transit.end)
+                    transit.at_once[4] = leads_to_rest(
+                        functions, tables, chatter, surface, t, y, p, period, workspace
+                    )
+                    copy_state(transit.end, workspace.after)
+                if pressed or transit.at_once[4] == 0:
                     following, pressed = chatter, False
-                copy_state(transit.end, workspace.after)
+            alike = still_bounced(tables, mode, following, transit.at_once[3])
+            transit.at_once[3] = 1 + surface if reset else alike
             why = CHATTER if pressed else ARRIVED
             return why, surface, following, duration, turns, t
         if reset or is_crossed(functions, tables, mode, surface, t, y, p, period, workspace):

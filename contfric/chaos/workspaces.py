@@ -45,7 +45,7 @@ def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
             transit.grad,
             transit.end,
             transit.image,
-            np.zeros((width, 3), dtype=np.int64),
+            np.zeros((width, 5), dtype=np.int64),
             np.zeros(width),
             np.full(width, SINGLY),
         ),

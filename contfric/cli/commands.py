@@ -6,6 +6,7 @@ import argparse
 import csv
 import json
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -117,6 +118,10 @@ def check(options: argparse.Namespace) -> int:
     """``contfric check MODEL``: what would make its results wrong; warnings do not fail it."""
     from contfric.models.check import check_model
 
+    given = [name for name in (options.model, options.also_model) if name is not None]
+    if len(given) != 1:
+        raise ParameterError("check takes one model: contfric check MODEL, or --model MODEL")
+    (options.model,) = given
     params = _parameters(options.params, options.model)
     report = check_model(options.model, params or None)
     print(json.dumps(report.to_dict(), indent=2) if options.json else report)
@@ -201,6 +206,13 @@ def census(options: argparse.Namespace) -> int:
     from contfric.cli.progress import ProgressLine
     from contfric.study.checkpoint import checkpoint_of
 
+    if options.old_model is not None:
+        warnings.warn(
+            "'contfric census MODEL' is now 'contfric census --model MODEL'",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        options.model = options.old_model
     params = _parameters(options.params, options.model)
     asked = (options.periods, options.stops, options.finer, options.seed)
     checkpoint = checkpoint_of(("census", options.model, sorted(map(str, params.items())), *asked))

@@ -190,7 +190,8 @@ def _fill_signatures(parser: argparse.ArgumentParser) -> None:
 
 def _fill_check(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("model", metavar="MODEL", help="the name of a model, or the path of its YAML file")
+    add("model", metavar="MODEL", nargs="?", help="name or YAML file of a model")
+    add("--model", dest="also_model", metavar="MODEL", help="the same, as other commands take it")
     add(
         *("-p", "--param"),
         dest="params",
@@ -228,7 +229,8 @@ def _fill_simulate(parser: argparse.ArgumentParser) -> None:
 
 def _fill_census(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("model", metavar="MODEL", nargs="?", default=DEFAULT_MODEL, help="a model (%(default)s)")
+    add("old_model", metavar="MODEL", nargs="?", help=argparse.SUPPRESS)  # as it was
+    add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
     add(
         *("-p", "--param"),
         dest="params",

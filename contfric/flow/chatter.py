@@ -46,7 +46,7 @@ CHATTERING = HandleType("chattering", LAYOUT)
 #: than a hundred for each.
 _NODES = 8
 #: A node has at most this share of the speed of the one before: nearer ones would cancel each other.
-_SHARE = 0.5
+SHARE = 0.5
 #: Extrapolations that differ by less than this (relative to 1 + the time) have rounding left.
 _EXACT = 4e-16
 #: Where they differ by more than this share of a period the impacts converge to nothing.
@@ -61,7 +61,7 @@ _REST = 1e-14
 #: A flight longer than this many periods (or units of time) is none between impacts of chatter; and where
 #: impacts have not come to rest in so many periods of an excitation, a mass is thrown about (10,000 of them,
 #: followed after each of its impacts, took a second).
-_LONGEST = 64.0
+LONGEST = 64.0
 
 
 @helper
@@ -143,7 +143,7 @@ def fly(motion, mode, t, y, p, which, slopes):  # type: ignore[no-untyped-def]
     flight, _ = flight_at(motion, mode, t, y, p, none, empty)
     level, before = motion.level(wall, p, none, empty), np.empty(n)
     unit = motion.period(p, none, empty)
-    within = _LONGEST * (unit if unit > 0.0 else 1.0)
+    within = LONGEST * (unit if unit > 0.0 else 1.0)
     tau = motion.hit(flight, c, level, True, t, y, within, p, before)
     if not tau > 0.0:
         return -1.0
@@ -270,12 +270,12 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
     )
     none, empty, speeds, weights = which[:0], grad[:0], nodes.speeds, nodes.weights
     c, node_side, period = motion.gaps[mode], 0, motion.period(p, which[:0], grad[:0])
-    unit, longest = (period, _LONGEST * period) if period > 0.0 else (1.0, np.inf)
+    unit, longest = (period, LONGEST * period) if period > 0.0 else (1.0, np.inf)
     count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
     for _ in range(MOST_IMPACTS):
         flight, side = flight_at(motion, mode, t, y, p, none, empty)
         v = side * motion.rate(flight, c, t, y, p, which, grad)
-        thrown = v > FASTER * before and before < _SHARE * highest
+        thrown = v > FASTER * before and before < SHARE * highest
         highest = max(highest, abs(v))
         if not v > _REST * max(1.0, highest):  # without restitution at once
             limit[0], limit[1:] = t, y
@@ -289,7 +289,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
             count, last = 0, np.inf  # the polynomial begins anew
         if count == 0:
             node_side = side
-        if count == 0 or (side == node_side and v <= _SHARE * speeds[count - 1]):
+        if count == 0 or (side == node_side and v <= SHARE * speeds[count - 1]):
             count = keep_node(nodes, count, v, t, y, slopes, side, grad)
             if count > 2:
                 shorter = extrapolated(speeds, nodes.values, 1, count, weights, 0)

@@ -18,6 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.chatter import FASTER
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.orbit.resting import impacts_ahead, still_bounced
 from contfric.orbit.sides import mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
@@ -66,10 +67,13 @@ _WIDER = 4.0
 _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
-#: 1 + the wall that was met last if no other event came since, the speed after that impact, and the unit of
-#: time of a model without excitation (1 if less).
-CARRIED = 10
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED, UNIT = range(CARRIED)
+#: 1 + the wall that was met last if impacts go on alike since, the speed after that impact, the impacts to
+#: come of which it is known that they do not lead to rest, and the unit of time of a model without excitation
+#: (1 if less).
+CARRIED = 11
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED, AHEAD, UNIT = range(
+    CARRIED
+)
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -210,14 +214,18 @@ def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # t
 
 @helper
 def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether infinitely many impacts follow, with nothing else between, until the wall lets go.
+    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall lets go.
 
+    Otherwise after how many impacts, counted from this one, that is to be asked again.
     ``workspace.after`` is written over.
     """
+    count, slow = impacts_ahead(functions, tables, chatter, surface, t, y, p, unit, workspace)
+    if not slow:
+        return count
     on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
     _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    return met >= 0 and tables.bounds[chatter, met] == 1
+    return 0 if met >= 0 and tables.bounds[chatter, met] == 1 else count
 
 
 @helper
@@ -264,13 +272,13 @@ def after_impact(  # type: ignore[no-untyped-def]
         return pressed, -1
     before, c = carry[SPEED], tables.observables[surface]
     carry[SPEED] = abs(functions.rate(target, c, t, y, p, workspace.none, workspace.empty))
-    anew = int(carry[BOUNCED]) != 1 + surface
+    carry[AHEAD] -= 1.0
+    anew = int(carry[BOUNCED]) != 1 + surface or not carry[AHEAD] > 0.0
     anew = anew or carry[SPEED] > FASTER * before or carry[AT_ONCE] > MOST_AT_ONCE
-    if pressed or (
-        anew and leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
-    ):
-        return pressed, chatter
-    return pressed, -1
+    if anew and not pressed:
+        carry[AHEAD] = leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
+    rests = pressed or (anew and carry[AHEAD] == 0.0)
+    return pressed, chatter if rests else -1
 
 
 @helper
@@ -339,7 +347,8 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
             return IMPOSSIBLE, event, mode, cycle, t
         if target == -1:
             continue  # nothing leads there: the surface is touched and left to the same side
-        carry[BOUNCED] = float(1 + surface) if reset else 0.0
+        alike = still_bounced(tables, mode, target, int(carry[BOUNCED]))
+        carry[BOUNCED] = float(1 + surface if reset else alike)
         write_event(rows, event, mode, surface, cycle, t)
         if not reset:
             copy_state(y, rows.states[event])

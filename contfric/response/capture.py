@@ -85,7 +85,7 @@ def capture(  # type: ignore[no-untyped-def]
             break
         for j in range(n):
             transit.y[j] = states[cell, j]
-        transit.at_once[0] = transit.at_once[2] = 0
+        transit.at_once[0] = transit.at_once[2] = transit.at_once[3] = 0
         labels[cell], ends[cell], cycle, t = -1, NOT_YET, 0, phase
         mode, on = start_mode(functions, tables, starting, time, transit.y, p, workspace)
         if mode < 0:

@@ -12,7 +12,12 @@ from contfric.cli import main
 from contfric.cli.exits import Exit
 
 PARAMS = {"Omega": 0.5376, "S": 0.32, "S0": 0.4}
-ARGUMENTS = ["census", "coulomb", *(f"-p={name}={value}" for name, value in PARAMS.items())]
+ARGUMENTS = [
+    "census",
+    "--model",
+    "coulomb",
+    *(f"-p={name}={value}" for name, value in PARAMS.items()),
+]
 
 
 @pytest.fixture(scope="module")
@@ -124,10 +129,16 @@ def test_command_prints_json(census: cf.Census, capsys) -> None:
     assert found["walks"]["FOUND"] == 2
 
 
+def test_the_model_as_it_was_named_before(capsys) -> None:
+    with pytest.warns(DeprecationWarning, match="contfric census --model MODEL"):
+        assert main(["census", "colomb"]) == Exit.BAD_INPUT
+    assert "did you mean 'coulomb'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["census", "colomb"], "unknown model 'colomb'; did you mean 'coulomb'"),
+        (["census", "--model", "colomb"], "unknown model 'colomb'; did you mean 'coulomb'"),
         (["census", "--param", "Omga=1"], "no parameter 'Omga'; did you mean 'Omega'"),
         (["census", "--periods", "0"], "--periods: invalid whole number >= 1 value: '0'"),
         (["census", "--finer", "4"], "finer is a whole number from 0 to 3, got 4"),
