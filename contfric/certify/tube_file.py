@@ -39,7 +39,7 @@ _MOST = 20_000
 #: how much shorter if one is not.
 _STEADY, _GROWTH, _SLOW, _SHORTER = 8, 1.3, 1.04, 0.75
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
-#: distance from there. And of a closed curve, so that no orbit is in its tube twice.
+#: distance from there.
 _BORN = 0.02
 #: Up to which share of the box of an end that the checker does not know a tube is written: before the event.
 _BEFORE = 0.8
@@ -190,9 +190,9 @@ def _kept(branch: Branch) -> tuple[float, float]:
     """Return the arclength from and up to which a branch is in its file."""
     first, last = float(branch.arc[0]), float(branch.arc[-1])
     born = [end.reason in (EndReason.BP, EndReason.PD) for end in branch.ends]
-    # of a closed curve, too: the checker sees that its first orbit does not come again
-    born[1] |= branch.ends[1].reason is EndReason.CLOSED
     left_out = [_BORN * (last - first) * there for there in born]
+    if branch.ends[1].reason is EndReason.CLOSED:  # its last point may lie beyond its first one
+        last = float(branch.arc[-2])
     return first + left_out[0], last - left_out[1]
 
 
