@@ -197,7 +197,7 @@ def false_statements(data: dict[str, Any]) -> list[str]:
         radii = [mpf(r) for r in data["radius"]]
         if any(abs(a - b) > r for a, b, r in zip(z, start, radii, strict=True)):
             wrong.append("exists")
-        for text, value in zip(data["enclosure"], z, strict=True):
+        for text, value in zip(data["enclosure"], z, strict=False):  # it may state less
             centre, radius = ball(text)
             if abs(value - centre) > radius + mpf(10) ** -40:
                 wrong.append("enclosure")
@@ -255,13 +255,14 @@ def _moved(text: str, rng: np.random.Generator, least: float) -> str:
 
 
 def _move_ball(data: dict[str, Any], rng: np.random.Generator) -> None:
-    k = int(rng.integers(len(data["enclosure"])))
-    data["enclosure"][k] = _moved(data["enclosure"][k], rng, -28)
+    if data["enclosure"]:
+        k = int(rng.integers(len(data["enclosure"])))
+        data["enclosure"][k] = _moved(data["enclosure"][k], rng, -28)
 
 
 def _move_disc(data: dict[str, Any], rng: np.random.Generator) -> None:
     if data["multipliers"]:
-        disc = data["multipliers"][int(rng.integers(2))]
+        disc = data["multipliers"][int(rng.integers(len(data["multipliers"])))]
         part = str(rng.choice(["re", "im"]))
         disc[part] = _moved(disc[part], rng, -17)
 
@@ -336,7 +337,8 @@ def _ball_for_a_parameter(data: dict[str, Any], rng: np.random.Generator) -> Non
 def _no_number(data: dict[str, Any], rng: np.random.Generator) -> None:
     """Put what is no number, or none that can be meant, in the place of one."""
     junk = (float("nan"), float("inf"), -float("inf"), 1e308, 5e-324, 0, -1e-10, True, None, "nan")
-    name = str(rng.choice(["joints", "radius", "enclosure", "params"]))
+    names = ("joints", "radius", "enclosure", "params")
+    name = str(rng.choice([name for name in names if data[name]]))
     where = list(data[name]) if name == "params" else range(len(data[name]))
     data[name][where[int(rng.integers(len(where)))]] = junk[int(rng.integers(len(junk)))]
 
@@ -353,7 +355,72 @@ def _inverted(data: dict[str, Any], rng: np.random.Generator) -> None:
                 disc["im"] = f"{mp.nstr(other.imag, 40)} +/- {mp.nstr(r, 5)}"
 
 
+def _mirrored(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """The other orbit of a symmetric pair, half a period later; or a part of that is forgotten."""
+    mirror = {"slide+": "slide-", "slide-": "slide+", "F+": "F-", "F-": "F+"}
+    forgotten = str(rng.choice(["nothing", "time", "segments", "half of the joints"]))
+    if forgotten != "segments":
+        data["segments"] = [[mirror.get(c, c) for c in row] for row in data["segments"]]
+    later = 0.0 if forgotten == "time" else np.pi / data["params"]["Omega"]
+    count = len(data["joints"]) // (2 if forgotten == "half of the joints" else 1)
+    data["joints"][:count] = [
+        -c if k % 2 else c + later for k, c in enumerate(data["joints"][:count])
+    ]
+    data["radius"] = [max(r, 1e-11) for r in data["radius"]]
+    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+
+
+def _later(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """The same orbit some periods later, or a part of one."""
+    turn = 2 * np.pi / data["params"]["Omega"] * float(rng.choice([-1, 1, 0.5, rng.uniform()]))
+    data["joints"] = [c if k % 2 else c + turn for k, c in enumerate(data["joints"])]
+    data["radius"] = [max(r, 1e-11) for r in data["radius"]]
+    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+
+
+def _one_more(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Cut a segment in two, or put one of no length between two."""
+    i = int(rng.integers(len(data["segments"])))
+    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
+    own = data["segments"][i]
+    data["segments"].insert(i, own if rng.uniform() < 0.5 else kinds[int(rng.integers(4))])
+    here = data["joints"][2 * i :][:2]
+    there = data["joints"][2 * i + 2 :][:2] or here
+    share = float(rng.choice([0.0, 1e-9, 0.5]))
+    between = [a + share * (b - a) for a, b in zip(here, there, strict=True)]
+    data["joints"][2 * i + 2 : 2 * i + 2] = between
+    data["radius"][2 * i + 2 : 2 * i + 2] = [1e-6, 1e-6]
+    data["enclosure"][2 * i + 2 : 2 * i + 2] = [f"{c!r} +/- 1e-5" for c in between]
+
+
+def _backwards(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """The motion in the other direction of time: forces are cosines, friction and damping are not so."""
+    data["segments"] = [
+        [{"slide+": "slide-", "slide-": "slide+"}.get(c, c) for c in row]
+        for row in data["segments"]
+    ][::-1]
+    pairs = list(zip(data["joints"][::2], data["joints"][1::2], strict=True))[::-1]
+    data["joints"] = [c for t, x in pairs for c in (-t, x)]
+    data["params"]["zeta"] *= -1
+    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+
+
+def _exchanged(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """Exchange two numbers of one kind."""
+    name = str(rng.choice(["joints", "radius", "enclosure", "multipliers", "segments"]))
+    if len(data[name]) > 1:
+        i, k = (int(c) for c in rng.choice(len(data[name]), 2, replace=False))
+        data[name][i], data[name][k] = data[name][k], data[name][i]
+
+
+def _less(data: dict[str, Any], rng: np.random.Generator) -> None:
+    """State less: which is true as long as the rest is."""
+    name = str(rng.choice(["enclosure", "multipliers", "statements"]))
+    data[name] = data[name][: int(rng.integers(len(data[name]) + 1))]
+
+
 _CHANGES = (
+    *(_mirrored, _later, _one_more, _backwards, _exchanged, _less),
     *(_move_joint, _shrink, _move_ball, _move_disc, _other_side, _other_params, _other_segment),
     *(_turned, _other_turn, _copied, _ball_for_a_parameter, _no_number, _inverted),
 )

@@ -191,6 +191,8 @@ def _kept(branch: Branch) -> tuple[float, float]:
     first, last = float(branch.arc[0]), float(branch.arc[-1])
     born = [end.reason in (EndReason.BP, EndReason.PD) for end in branch.ends]
     left_out = [_BORN * (last - first) * there for there in born]
+    if branch.ends[1].reason is EndReason.CLOSED:  # its last point may lie beyond its first one
+        last = float(branch.arc[-2])
     return first + left_out[0], last - left_out[1]
 
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from flint import arb, arb_mat, arb_series, ctx
 
-from contfric.verify.motion import Refused, Scene, Undecided, ball, part, see
+from contfric.verify.motion import Scene, Undecided, ball, part, see
 
 HALF, INSIDE = arb(0.51), arb(0, 0.51)  # of a box, which reaches beyond its ends
 STEEP, MOST_PIECES, MOST_HALVINGS = 0.02, 20_000, 90  # least share of a parameter; of a segment
@@ -45,19 +45,18 @@ class Box:
         self.radii = column(radii) + least if radii else size(2 * off + least)
         for _ in range(1 if radii else 4):
             self.gap = 1 - size(1 - self.inverse * self.equations(INSIDE)[1])
-            reached = self.radii - self.gap * self.radii + off
-            if all(margin > 0 for margin in (self.radii - reached).entries()):
+            if all(margin > 0 for margin in (self.gap * self.radii - off).entries()):
                 if self.newton and not radii:  # an orbit
-                    Scene.check_period(*self.orbits(0))
+                    see(Scene.misses(*self.orbits(0)), "no part of its period is one", False)
                 return self
-            self.radii = size(1.5 * reached + least)
+            self.radii = size(1.5 * (self.radii - self.gap * self.radii + off) + least)
         raise Undecided("one orbit in a box")
 
     def orbits(self, s: Any, slope: arb_mat | None = None) -> tuple[Scene, list[Any]]:
         """Return scene and unknowns for all s in a ball; with a slope as power series."""
         *y, last = (arb(0, r.upper()) for r in self.radii.entries())
-        line = self.middle + arb(s) * self.along
-        *z, value = (line + column([*y, 0 if self.fixed else last])).entries()
+        off = column([*y, 0 if self.fixed else last])
+        *z, value = (self.middle + arb(s) * self.along + off).entries()
         if slope is not None:
             *z, value = (arb_series([*c]) for c in zip([*z, value], slope.entries(), strict=True))
         return Scene(self.data, value), z
@@ -99,8 +98,8 @@ class Box:
             never = pair > 0 if other else k == 0 and 0 not in part(scene.value, 1)  # or no fold
             if not never and 0 in here[k] + rate * INSIDE:
                 low, high = (Scene.multipliers(*box.orbits(0))[2][k] for box in (first, last))
-                if 0 in rate or 0 in low * high or (other and not pair < 0):
-                    raise Undecided(f"a {kind} may be in a box")
+                unclear = 0 in rate or 0 in low * high or (other and not pair < 0)
+                see(not unclear, f"whether a {kind} is in a box", False)
                 found += [kind] * bool(low * high < 0)
         return found
 
@@ -126,8 +125,8 @@ def check_admissible(scene: Scene, z: list[arb], met: Any = (), short: bool = Fa
         start = levels[i - 1] * (scene.closing if i == 0 else 1)
         vanishes = short and side != 0 and side == start
         see(vanishes or tau, f"{what} lasts")
-        if after not in ((0, -direction) if direction else (-side,)) or after * levels[i] > 0:
-            raise Refused(f"{what} does not lead on in that direction")
+        leads = after in ((0, -direction) if direction else (-side,))
+        see(leads and not after * levels[i] > 0, f"{what} leads on in that direction")
         if direction and after and not levels[i]:  # a stick shows by itself that it may begin
             end, x = scene.joint(z, i + 1)
             see(after * (scene.force(end) - x) - scene.s0, f"{what}: it reverses at its end")
@@ -166,10 +165,9 @@ def met_in(box: Box, a: Box, b: Box, kind: str, spots: list[Any]) -> dict[tuple[
     """Return what is met at an event between two orbits, and when: all of it falls, and some passes 0."""
     (scene, z), moving, met, passed = box.orbits(INSIDE), box.moving(), {}, False
     for i, what, *window in spots:
-        name = {1: "F+", -1: "F-"}.get(what, what)
+        name = {1: "F+", -1: "F-", "F+": "F+", "F-": "F-", "v": "v"}.get(what, "")
         slides = abs(scene.segments[i][0]) if i in range(scene.count) else ""
-        if name not in ("v", "F+", "F-") or f"{slides}{name[0]}{len(window)}" != MET.get(kind):
-            raise Refused(f"a {kind} at {[i, what]} is not checked here")
+        see(f"{slides}{name[:1]}{len(window)}" == MET.get(kind), f"a {kind} is at {[i, what]}")
         times = [ball(text) for text in window]
         first, last = (_met(*point.orbits(0), i, name, times)[0] for point in (a, b))
         _, grows, met[i, name] = _met(scene, z, i, name, times)

@@ -30,6 +30,7 @@ def check_text(text: str) -> Answer:
     cap, ctx.cap = ctx.cap, 3
     try:
         data = json.loads(text)
+        json.loads(text, object_pairs_hook=lambda p: see(len(dict(p)) == len(p), "names come once"))
         parts = data["checkable"] if data["certificate"] == "diagram" else [data]
         moved = {k for p in parts[1:] for k, v in p["params"].items() if v != parts[0]["params"][k]}
         moved |= {p["parameter"] for p in parts if "parameter" in p}
@@ -81,7 +82,7 @@ def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], Box]
 
 def _check_tube(data: Any) -> list[str]:
     points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Box]()
-    stop = len(points) - 2
+    stop, (scene, start) = len(points) - 2, points[0].orbits(0)
     see(stop >= bool(left and right) and "T" not in f"{left}{right}", "a tube may have such ends")
     for k, (a, b) in enumerate(pairwise(points)):
         first, last, end = (b, a, left) if left and k == 0 else (a, b, right if k == stop else None)
@@ -92,6 +93,9 @@ def _check_tube(data: Any) -> list[str]:
         turn, pairs = -1 if left and k == 1 else 1, permutations((boxes[k - 1], box))
         goes = [(p.border * p.along * p.border * q.slope)[0, 0] * turn for p, q in pairs]
         see(max(goes, key=arb.lower), "it goes on and does not turn back")
+        low, high = (scene.value - point.orbits(0)[0].value for point in (a, b))
+        past = (box.fixed and low * high > 0) or Scene.misses(*box.orbits(INSIDE), start)
+        see(k == 0 or past, "the first orbit does not come again", False)
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
     return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"]
@@ -119,14 +123,13 @@ def _check_orbit(data: Any) -> list[str]:
     if "admissible" in claims:
         check_admissible(scene, z)
     trace, det, jury = scene.multipliers(z)
-    for margin in jury if "stable" in claims else ():
-        see(margin, "the multipliers lie inside of the circle")
+    see("stable" not in claims or min(jury, key=arb.lower), "multipliers are inside of the circle")
     see("unstable" not in claims or -min(jury, key=float), "a multiplier is outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
     discs = [acb(ball(disc["re"]), ball(disc["im"])) for disc in data["multipliers"]]
-    held = (disc.contains(mu) for disc, mu in zip(discs, found, strict=bool(discs)))
-    see(all(held), "the multipliers lie in their discs", False)
+    pairs = zip(discs, found, strict=bool(discs))
+    see(all(disc.contains(mu) for disc, mu in pairs), "the multipliers lie in their discs", False)
     return [c for c in CLAIMS if c in claims] + ["multipliers"] * bool(discs)
 
 

@@ -61,15 +61,14 @@ class Scene:
     """The parameters and segments of a file, and their solution; joints are (phase of the excitation, x)."""
 
     def __init__(self, data: dict[str, Any], value: Any) -> None:
-        self.periods, self.half = periods, _ = data["periods"], data["half"]
+        periods, self.half = data["periods"], data["half"]
         possible = type(periods) is int and self.half in (False, periods % 2 == 1) and periods > 0
-        possible = possible and {*data["params"], data["parameter"]} == set(PARAMETERS)
-        see(possible, "parameters, periods and symmetry are those of a periodic orbit")
+        see({*data["params"], data["parameter"]} == set(PARAMETERS) and possible, "it is periodic")
         p = {name: ball(given - 0) for name, given in data["params"].items()}  # and no text
         self.value = p[data["parameter"]] = value
         self.omega, self.s, self.s0, h, self.zeta = (p[name] for name in PARAMETERS)
-        if not all((part(self.omega, 0) > 0, part(self.s, 0) >= 0, part(self.s0 - self.s, 0) >= 0)):
-            raise Undecided("Omega > 0, S0 >= S >= 0")
+        limits = (part(self.omega, 0) > 0, part(self.s, 0) >= 0, part(self.s0 - self.s, 0) >= 0)
+        see(all(limits), "Omega > 0, S0 >= S >= 0", False)
         self.waves = [(1, arb(1), self.omega), (3, h, 3 * self.omega)][: 1 if h == 0 else 2]
         self.polynomial = [1 - w * w + 2 * J * self.zeta * w for _, _, w in self.waves]
         self.square = 1 - self.zeta * self.zeta
@@ -121,12 +120,11 @@ class Scene:
         """Return joint i, the last one by periodicity or symmetry."""
         return z[2 * i :][:2] if i < self.count else (z[0] + self.turn, self.closing * z[1])
 
-    def check_period(self, z: list[Any]) -> None:
-        """See that no part of the period is one: the first joint does not come again after it."""
-        for q in (q for q in range(2, self.count + 1) if self.periods % q == 0 == self.count % q):
-            phase, x = self.joint(z, self.count // q)
-            off = abs(phase - z[0] - self.turn / q) + abs(x - self.closing * z[1])
-            see(off, f"1/{q} of its period is not one")
+    def misses(self, z: list[Any], stop: Any = None) -> bool:
+        """Tell whether no joint is a given one, or no other one the first, whole periods of f apart."""
+        (t, y, *_), joints = stop or z, [self.joint(z, i) for i in range(self.count)]
+        joints += [(phase + self.turn, -x) for phase, x in joints] * self.half
+        return all(abs(((p - t) / 2).sin()) + abs(x - y) > 0 for p, x in joints[not stop :])
 
     def duration(self, z: list[Any], i: int) -> Any:
         """Return how long segment i lasts."""

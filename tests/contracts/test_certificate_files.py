@@ -83,7 +83,16 @@ def test_several_turns_of_an_orbit_are_none_of_a_longer_period(index: int, count
     data = copied(json.loads(certificate(index)), count)
     answer = check_text(json.dumps(data))
     assert not answer.yes
-    assert f"1/{count} of its period" in answer.why
+    assert "no part of its period is one" in answer.why
+
+
+def test_a_name_that_comes_twice_is_refused() -> None:
+    """One reader of the file takes the first one, another the last one."""
+    text = certificate(0)
+    for name in ("statements", "S"):
+        other = text.replace(f'"{name}": ', f'"{name}": 0, "{name}": ', 1)
+        assert json.loads(other) == json.loads(text)
+        assert "names come once" in check_text(other).why
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 import contfric as cf
+from contfric.certify import tube_file
 from contfric.certify.branch import certify_branch
 from contfric.certify.files import verify
 from contfric.certify.tube_file import tubes_of
@@ -260,6 +261,25 @@ def test_a_tube_of_two_knots_cannot_have_two_ends() -> None:
     data = fold()
     data |= {"knots": data["knots"][-2:], "events": [], "ends": [data["ends"][1]] * 2}
     assert not is_verified(data)
+
+
+@pytest.mark.slow
+def test_a_tube_goes_round_a_closed_curve_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All boxes are right, and events that come again are stated again."""
+    params = {"Omega": 0.4667, "S": 0.33, "S0": 0.464, "h": -0.12}
+    orbit = cf.find_orbit("coulomb", params, state=(0.3, 0.3), longest=400)
+    branch = cf.continue_orbit(orbit, "S", (0.05, 0.46))
+    assert branch.ends[1].reason is cf.EndReason.CLOSED
+    proof = certify_branch(branch)
+    (data,) = tubes_of(proof)
+    assert [kind for _, kind in data["events"]] == ["SN", "SN"]
+    assert is_verified(data)
+    monkeypatch.setattr(tube_file, "_kept", lambda branch: (branch.arc[0], branch.arc[-1]))
+    (again,) = tubes_of(proof)  # its last point is beyond its first one
+    assert data["knots"][:-1] == again["knots"][: len(data["knots"]) - 1]
+    assert not is_verified(again)
+    turns = {"knots": [*again["knots"][-8:], *again["knots"][1:]], "events": again["events"]}
+    assert not is_verified(again | turns)
 
 
 @pytest.mark.slow
