@@ -1,4 +1,4 @@
-"""Two branches beside AUTO-07p, paired in one run; writes docs/benchmarks-auto.md.
+"""Two branches compared with AUTO-07p, paired in one run; writes docs/benchmarks-auto.md.
 
 ``AUTO_DIR=.. python benchmarks/auto.py`` takes AUTO-07p built from its public repository (its ``lib`` and
 ``include``) and gfortran; without them there is nothing to do. Both programs take turns; times are of the
@@ -196,7 +196,7 @@ def page(tables: Sequence[list[str]]) -> str:
     return f"""# Against AUTO-07p
 
 Written by `benchmarks/auto.py`: {origin()}. Medians of {ROUNDS}
-turns, processor time; AUTO's start is taken off. The number beside AUTO's name is that of its mesh
+turns, processor time; AUTO's start is taken off. The number next to AUTO's name is that of its mesh
 intervals, `NTST`.
 
 ## The orbit 1a of Fig. 5

@@ -130,7 +130,7 @@ STIFF = ((0.01, (1e4, 1e5, 4e5)), (0.005, (4e5,)))
 
 
 def lugre() -> list[str]:
-    """Table: LuGre's 1a at Omega = 1/2, beside Stribeck's and Coulomb's."""
+    """Table: LuGre's 1a at Omega = 1/2, next to Stribeck's and Coulomb's."""
     lines = [
         "| vS | sigma0 | sigma1 | to stribeck | derived | to coulomb | derived |",
         "|---|---|---|---|---|---|---|",

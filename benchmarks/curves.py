@@ -14,7 +14,7 @@ from pathlib import Path
 from origin import origin, renewed
 
 import contfric as cf
-from contfric.continuation.points import Rows
+from contfric.continuation.points import PointRows
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import problem_of
 from contfric.curves.ranges import box_of
@@ -49,7 +49,7 @@ def march_cost(bifurcation, points=60, runs=40):
     start, border = first_curve_point(problem, bifurcation.orbit)
     best = float("inf")
     for _ in range(runs):
-        rows = Rows.empty(problem.system, points, 2)
+        rows = PointRows.empty(problem.system, points, 2)
         rows.put(0, start)
         began = time.process_time()
         _, last, _ = march_rows(problem, rows, 0, start, 0, border.copy(), STEP, STEP)

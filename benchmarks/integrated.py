@@ -253,7 +253,7 @@ def stiffness() -> str:
 
 
 def period_of_lugre() -> str:
-    """One period with variational equations, beside heyoka."""
+    """One period with variational equations, and that of heyoka."""
     head = ("S", "method", "tolerance", "error", "error of derivatives", "ms a period")
     return table(head, lugre_period.rows())
 
@@ -279,7 +279,7 @@ PAGE = """# What integration costs
 Written by `make bench` (`benchmarks/integrated.py`): {origin}.
 How it works stands in [integration](integration.md). Times are the least processor times of many calls.
 
-## Beside the closed form
+## Compared with the closed form
 
 The Coulomb oscillator, once in closed form and once from its fields, at a tolerance of 1e-12.
 

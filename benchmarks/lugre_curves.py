@@ -1,7 +1,7 @@
 """Curves of the LuGre plane against runs in one parameter.
 
 At points of every curve that ``docs/gallery/lugre_plane.py FOLDER`` has left in its folder a short branch is
-continued in one of the parameters, the other one fixed, from an orbit beside the curve; the event that it
+continued in one of the parameters, the other one fixed, from an orbit next to the curve; the event that it
 locates is compared with the curve. The two have no equation of the bifurcation in common: a run looks at
 multipliers of orbits (or at the slope of the parameter), the curve solves a bordered system.
 

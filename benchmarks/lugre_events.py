@@ -50,7 +50,7 @@ def main(path: str) -> None:
     """Print a row for each side of each event."""
     diagram = cf.load(path)
     name = diagram.parameter
-    print(f"| event | {name} | beside | largest multiplier | measured rate |")
+    print(f"| event | {name} | next to it | largest multiplier | measured rate |")
     print("|---|---|---|---|---|")
     for branch in diagram.branches:
         if branch.mirrored:

@@ -1,4 +1,4 @@
-"""One period of the LuGre oscillator with its variations, beside heyoka where that is installed.
+"""One period of the LuGre oscillator with its variations, compared with heyoka where that is installed.
 
 Both find the stops (v = 0) on the way, at which the field has a kink. Errors are those against our own method
 at 1e-14, bristles in units of 1/sigma0. What is compared is the time at one error, not at one tolerance: an

@@ -239,7 +239,7 @@ def main() -> None:
         "",
         "A chain of masses on springs, forced at its free end; the first mass rubs (S = 0.2, S0 = 0.25). "
         f"{PERIODS} periods of the excitation with every stick and slip, no derivatives. Milliseconds, the "
-        f"least of {ROUNDS} rounds in turns, in one process; the error is that of the last state, beside "
+        f"least of {ROUNDS} rounds in turns, in one process; the error is that of the last state, against "
         "matrix exponentials with events by Brent's method. scipy (DOP853 with events) and heyoka have the "
         f"loosest tolerance whose error is at most {WANTED:.0e}, and are compiled or warm before; a dash: "
         "not installed. contfric has no tolerance here.",

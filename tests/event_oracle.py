@@ -1,6 +1,6 @@
 """What a certificate of an event states, decided by brute force; and ways to falsify it.
 
-Orbits beside the event are solved in 60 digits (:mod:`tests.certificate_oracle`); what vanishes must have
+Orbits next to the event are solved in 60 digits (:mod:`tests.certificate_oracle`); what vanishes must have
 another sign a little to each side of the stated ball.
 """
 

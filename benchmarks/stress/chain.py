@@ -9,7 +9,7 @@ joints, with two equations a segment::
 
 and the closure ``z_N = (t_0 + turn, x_0)``, or ``(t_0 + turn, -x_0)`` after half of a symmetric orbit.
 X and V are those of a textbook: undetermined coefficients, and the free solution that makes up the
-difference. They cancel beside resonance; there are digits to be spent.
+difference. They cancel next to resonance; there are digits to be spent.
 
 Of contfric's results only the order of the segments and a start for Newton are used.
 """
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 import contfric as cf
 
-#: Working digits. The worst case is a frequency 1e-16 beside resonance: 1/(1 - w^2) costs 16 digits
+#: Working digits. The worst case is a frequency 1e-16 off resonance: 1/(1 - w^2) costs 16 digits
 #: in the response and 16 more in its difference; more than 60 are left.
 DIGITS = 100
 #: Corrections below this end Newton's iteration: 50 digits.

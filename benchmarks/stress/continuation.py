@@ -39,7 +39,7 @@ SAME, LOOSE = 1e-9, {"SINGULAR": 1e-6, "UNBOUNDED": 1e-6}
 #: what the event says that it is accurate to, if that lies between the two: where its equations are singular,
 #: too, the state is known to the root of rounding, though a bound of the parameter may be far above that.
 AT_VERTEX, SOLVED = 1e-4, 1e-8
-#: Ends that say that something went wrong, not that something happened. SINGULAR is none where the
+#: Ends that say that something went wrong, not that something happened. SINGULAR is no failure where the
 #: orbits are degenerate; it is counted.
 FAILURES = frozenset({"STEP", "BROKEN", "POINTS", "START", "INTERRUPTED"})
 #: Shortest branch that is retraced, in largest steps of the finer trace: below, it is one step long.

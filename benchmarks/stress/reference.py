@@ -3,7 +3,7 @@
 ``x'' + 2 zeta x' + x = f(t) - s S``, ``f = cos(Omega t) + h cos(3 Omega t)``, by undetermined
 coefficients: a forced part ``alpha cos w t + beta sin w t`` for each harmonic, with
 ``alpha + i beta = 1 / (1 - w^2 - 2 i zeta w)``, and the free motion that makes up the difference to the
-state at the start, with ``exp(-zeta d)`` times sines, hyperbolic sines or (``|zeta| = 1``) powers. Beside
+state at the start, with ``exp(-zeta d)`` times sines, hyperbolic sines or (``|zeta| = 1``) powers. Next to
 resonance both parts are large and cancel: the working precision grows by the bits that this costs. At
 resonance itself (zeta = 0, Omega = 1) the forced part is ``d/2 sin t``. (3 Omega = 1 has no solution in
 doubles.)

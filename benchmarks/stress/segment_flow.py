@@ -2,7 +2,7 @@
 
 Let y be the state, J its derivatives, and p_k the arguments (t0, x0, v0, duration, Omega, S, h, zeta), each a
 double. Half a unit in the last place of an argument changes an entry e of y or J by ``EPS/2 |de/dp_k p_k|``;
-that is its conditioning, from differences in the reference. Beside it stands what the formulas must
+that is its conditioning, from differences in the reference. Next to it stands what the formulas must
 round: the parts that an entry is the sum of. Errors are reported in units of
 
     EPS (|e| + sum_k |de/dp_k p_k| + parts).
@@ -26,7 +26,7 @@ from segment_cases import Case
 from contfric.flow.forced_oscillator import flow
 
 EPS = 2.0**-52
-#: Bits for differences of differences: 200 are lost beside resonance, 80 to 120 by each difference.
+#: Bits for differences of differences: 200 are lost next to resonance, 80 to 120 by each difference.
 BITS = 900
 #: Relative steps of the differences: their squares are the relative errors.
 STEP, OUTER_STEP = 2.0**-120, 2.0**-80

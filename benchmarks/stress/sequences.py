@@ -3,7 +3,7 @@
     python benchmarks/stress/sequences.py --count 100000 --seed 1 --workers 2 --out sequences.json
 
 What is drawn stands in :mod:`sequence_cases`, what is compared in :mod:`sequence_compare`, and what errors
-are measured against in :mod:`sequence_errors`. With ``--out`` each chunk that is done is kept beside the
+are measured against in :mod:`sequence_errors`. With ``--out`` each chunk that is done is kept next to the
 report, and a run that was interrupted goes on from there.
 """
 

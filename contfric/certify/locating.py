@@ -97,9 +97,10 @@ def _released(
     """Return an orbit at the end of its holds as one without them, and what vanishes on that one.
 
     A hold that ends on a limit of rest is released there anyway: it is a stick. One that is left without
-    acceleration goes on as the rest that follows. One without length is none, and the stick before it is left
-    where the load is stationary. What is left of the others is that their pin is met. Where the stick up to a
-    touch of its limit vanishes, the hold after it starts at a stop on the limit, the load being stationary.
+    acceleration goes on as the rest that follows. One without length is no hold, and the stick before it is
+    left where the load is stationary. What is left of the others is that their pin is met. Where the stick up
+    to a touch of its limit vanishes, the hold after it starts at a stop on the limit, the load being
+    stationary.
     """
     system, (first, last) = orbit.system, (0, 0)
     for k, test in enumerate(tests):

@@ -52,7 +52,7 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
     """
     itinerary, i = orbit.itinerary, location.segment
     if is_hold(itinerary[i][1]):
-        raise NotationError(f"segment {i + 1} is a hold: where nothing jumps there is none")
+        raise NotationError(f"segment {i + 1} is a hold: nothing can be held where nothing jumps")
     if location.margin is Margin.JOINT:
         return _two_at_once(orbit, i, location.surface)
     if location.margin is Margin.INTERIOR:

@@ -58,7 +58,7 @@ MOST_IMPACTS = 10_000
 FASTER = 2.0
 #: A speed below this share of that of the first impact, and of 1, is rest.
 _REST = 1e-14
-#: A flight longer than this many periods (or units of time) is none between impacts of chatter; and where
+#: A flight longer than this many periods (or units of time) is not one between impacts of chatter; and where
 #: impacts have not come to rest in so many periods of an excitation, a mass is thrown about (10,000 of them,
 #: followed after each of its impacts, took a second).
 LONGEST = 64.0

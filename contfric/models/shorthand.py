@@ -205,7 +205,7 @@ def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
 def _going_on(data: dict[str, Any], before: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """Return a model in which what is divided goes on, in any of its parts, where a turn or a period begins.
 
-    Other modes may hold there, too, if they overlap; these resets are none that the user wrote.
+    Other modes may hold there, too, if they overlap; the user did not write these resets.
     """
     own, resets = mapping_in(before, "resets"), mapping_in(data, "resets")
     goes_on = [{part: {FROM: [*all_]}} for all_ in parts.values() for part in all_]

@@ -69,7 +69,10 @@ def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tupl
         if surface.switching and surface.name not in orbit.model.section_surfaces:
             continue
         name, limit = surface.name, orbit.flow.level(surface.name)
-        gap = np.array([orbit.flow.height(name, t, y) for t, y in zip(times, states, strict=True)])
+        seen = [
+            orbit.flow.observe(surface.observable, t, y) for t, y in zip(times, states, strict=True)
+        ]
+        gap = np.array(seen) - limit
         # a sample on the surface (a joint, or the middle of a solution) has no side
         sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
         for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):

@@ -72,7 +72,7 @@ def test_slide(sign: int, zeta: float, omega: float) -> None:
     assert known == 1
     exact = expected(sign, start, along, (omega, s, h, zeta))
     found = jac[:, [0, 1, 2, 3, 4, 5, 7, 8]]  # S0 does nothing to a slide
-    # the largest entries are 100; beside critical damping the roots are 0.04 apart
+    # the largest entries are 100; next to critical damping the roots are 0.04 apart
     np.testing.assert_allclose(found, exact, rtol=2e-11, atol=2e-11)
     assert not np.any(jac[:, 6])
 

@@ -213,7 +213,7 @@ def test_a_stick_lasts_until_waves_have_come_back() -> None:
     )
     start = [*np.ones(n), *np.zeros(n)]
     found = cf.simulate(model, {}, state=start, periods=2)
-    events = [exit_ != "phase" for _, exit_ in found.itinerary]  # a section is none
+    events = [exit_ != "phase" for _, exit_ in found.itinerary]  # a section is no event
     times = (found.times + found.cycles * 2.0 * np.pi / w)[events]
     first = times[1] - times[0]
     assert first > 2.0 * np.pi / w

@@ -49,7 +49,7 @@ def test_what_is_mapped_on_its_way_back_jumps(tmp_path, seed: int) -> None:
 
 @pytest.mark.parametrize("reset", ["{v: 0.7*v, from: [falls]}", "{v: v - k*v**2, from: [falls]}"])
 def test_what_is_mapped_to_itself_at_a_touch_does_not_jump(tmp_path, reset: str) -> None:
-    """A loss of speed is none at speed zero: orbits go on beyond the touch."""
+    """At speed zero no speed is lost: orbits go on beyond the touch."""
     model = typed(tmp_path, GATE.replace("RESET", reset))
     A = grazed(1.4, 0.1, 1.0)
     diagram = cf.explore(

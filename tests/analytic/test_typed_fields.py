@@ -166,7 +166,7 @@ def test_one_state_without_excitation_is_explored(tmp_path) -> None:
 
 
 def test_a_kink_of_a_reset_is_said(tmp_path) -> None:
-    """Without saturation there is none, and one that no motion meets is none."""
+    """Without saturation there is none, and one that no motion meets does not count."""
     assert "the reset at 'tick' has a kink where" in str(cf.check_model(typed(tmp_path, BRIDGE)))
     plain = BRIDGE.replace("min(max(0.5 + k*(ref - i), 0), 1)", "0.5 + k*(ref - i)")
     along = plain.replace("(ref - i)", "(ref - i) + 0*abs(r + 5)")

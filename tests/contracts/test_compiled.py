@@ -207,7 +207,7 @@ def test_a_model_by_another_name_is_not_compiled_again():
 
 
 def test_a_damaged_cache_is_mended_in_a_run_from_the_shell(tmp_path):
-    """The whole way, in processes of their own: kernels of a file that lies beside nothing."""
+    """The whole way, in processes of their own: kernels of a file that has nothing next to it."""
     source = "from contfric.compiled import f8, kernel\n\n\n@kernel(f8(f8))\ndef f(x):\n    return 3 * x\n"
     (tmp_path / "tiny.py").write_text(source)
     cache = tmp_path / "cache"

@@ -130,7 +130,7 @@ def test_the_file_of_a_branch_holds_its_orbits_and_events(tmp_path: Path) -> Non
     orbit = cf.solve_orbit("coulomb", "0s", {**PARAMS, "Omega": 0.55})
     branch = cf.continue_orbit(orbit, "Omega", (0.53, 0.56))
     proof = branch.certify()
-    assert proof.points_proved >= len(branch) - 1  # at the event itself it is none, or the event's
+    assert proof.points_proved >= len(branch) - 1  # at the event there is none
     proof.save(tmp_path / "branch.json")
     answer = verify(tmp_path / "branch.json")
     assert answer.yes

@@ -131,7 +131,7 @@ def test_ctrl_c_acts_at_once(model: str) -> None:
     # a census is offered for the first model only, and there are no bridges in the second
     missing = () if model == "coulomb" else ("census", "period_adding")
     calls = [name for name in (*KEPT, *RAISED) if name not in missing]
-    # its own group: a signal for the tests is none for it
+    # its own group: a signal for the tests does not reach it
     process = subprocess.Popen(
         [sys.executable, "-c", SCRIPT, model, str(LOST), *calls],
         stdout=subprocess.PIPE,

@@ -6,7 +6,7 @@ from catalogue import FUNCTIONS
 
 from contfric.compiled import allocating_helper, f8, i8, indices, kernel, types, vector
 from contfric.flow.dop853 import STAGES, explicit_step
-from contfric.flow.general import Kind, handle_of
+from contfric.flow.general import FlowKind, handle_of
 from contfric.flow.radau import IMPLICIT_STAGES, implicit_step
 from contfric.flow.stepping import accept_step
 from contfric.flow.variations import begin, integration_workspace, slope
@@ -33,7 +33,9 @@ def march(motion, implicit, mode, y0, dt, steps, p, which, out):
 
 
 @kernel(
-    types.void(handle_of(Kind.PLAIN), types.boolean, i8, vector, f8, i8, vector, indices, vector)
+    types.void(
+        handle_of(FlowKind.PLAIN), types.boolean, i8, vector, f8, i8, vector, indices, vector
+    )
 )
 def fixed_steps_of(motion, implicit, mode, y0, dt, steps, p, which, out):
     march(motion, implicit, mode, y0, dt, steps, p, which, out)

@@ -22,8 +22,9 @@ from contfric.signature.holds import TOUCH, is_hold
 
 Scene = tuple[dict[str, float], str, tuple[float, float]]
 
-#: Random scenes whose diagrams have bridges: the first ten that have at most 30 branches, and larger ones.
-SEEDS = (1, 10, 29, 33, 35, 37, 43, 46, 49, 56)
+#: Random scenes whose diagrams have bridges: the first ten that have at most 30 branches (the last
+#: three take longest), and larger ones.
+SEEDS = (1, 29, 33, 35, 37, 46, 49, 10, 43, 56)
 LARGE = (16, 20, 25)
 #: Chosen ones: what each holds is asserted by test_the_chosen_ones_have_each_kind.
 CHOSEN: dict[str, Scene] = {
@@ -91,7 +92,8 @@ def diagram(case: int | str) -> cf.Diagram:
 
 
 each_case = pytest.mark.parametrize(
-    "case", [*CHOSEN, *SEEDS, *(pytest.param(seed, marks=pytest.mark.slow) for seed in LARGE)]
+    "case",
+    [*CHOSEN, *SEEDS[:7], *(pytest.param(k, marks=pytest.mark.slow) for k in (*SEEDS[7:], *LARGE))],
 )
 
 
@@ -310,7 +312,7 @@ def test_ends_of_bridges_have_their_reasons(case: int | str) -> None:
             assert not branch.stable.any()
 
 
-@pytest.mark.parametrize("case", [*CHOSEN, 1, 10])
+@pytest.mark.parametrize("case", [*CHOSEN, 1, 29])
 def test_the_same_twice(case: int | str) -> None:
     first, again = diagram(case), diagram.__wrapped__(case)
     assert len(first.branches) == len(again.branches)

@@ -223,7 +223,7 @@ def test_an_event_of_an_integrated_flow_is_bracketed_to_its_rounding_and_no_furt
 
 @pytest.mark.parametrize("distance", [1e-3, 1e-4, 1e-5])
 def test_newton_settles_at_the_rounding_of_an_integrated_flow(distance: float) -> None:
-    """Beside this vertex corrections are 1e-13 divided by the distance to it, and fall no further."""
+    """Next to this vertex corrections are 1e-13 divided by the distance to it, and fall no further."""
     branch = cf.continue_orbit(cf.find_orbit("bang-bang", {"A": 20.0}), "A", (19.0, 24.0))
     (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
     orbit = event.orbit.as_whole()

@@ -147,7 +147,7 @@ def test_signature_is_the_one_that_the_simulation_visits(name: str) -> None:
 @each_diagram
 def test_multipliers_are_those_of_the_simulated_return_map(name: str) -> None:
     """Central differences of the stroboscopic map at a time inside a slide; trace and determinant,
-    which are smooth where eigenvalues are not. Beside an event the map bends: left out."""
+    which are smooth where eigenvalues are not. Next to an event the map bends: left out."""
     step, count = 1e-6, 0
     for orbit in orbits(name, every=4):
         if np.min(orbit.margins) < 1e-3:

@@ -38,7 +38,7 @@ def test_the_windows_in_order() -> None:
     lows = [w.range[0] for w in windows()]
     highs = [w.range[1] for w in windows()]
     assert lows == sorted(lows) and highs == sorted(highs)
-    assert lows[0] < 0.49174881 < highs[0], "the first one lives beside 2a, too"
+    assert lows[0] < 0.49174881 < highs[0], "the first one lives next to 2a, too"
     assert lows[1] > 0.49174881 and highs[-1] < 0.49181666
 
 

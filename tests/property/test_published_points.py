@@ -229,7 +229,7 @@ def test_the_place_of_a_vertex_does_not_depend_on_where_it_is_looked_for(
 
 
 def test_what_rounding_moves_is_not_solved() -> None:
-    """With S = S0 just above the force a mass creeps to rest: an orbit of slides of no length is none."""
+    """With S = S0 just above the force a mass creeps to rest: slides of no length make no orbit."""
     params = {
         "Omega": 0.39478189823284165,
         "S": 1.0581242941885205,

@@ -199,7 +199,7 @@ def _goes_on(
 def check_resets(report: ModelReport, probe: Probe) -> None:
     """Check that a reset leads into a domain, and away from the surfaces that it is on there.
 
-    Where that is so for some states only, others may be none that motion arrives in: a note.
+    Where that is so for some states only, motion may never arrive in others: a note.
     """
     for reset in probe.model.resets:
         faults, fine = [], 0
