@@ -49,7 +49,7 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
         side.end = End(EndReason.POINT)
         return True
-    missed = not located and limit is None and bool((after.tests[:-EXTRA] < -VIOLATED).any())
+    missed = not located and limit is None and violates(after)
     if _comes_closer(side, located, missed, after.arc - before.arc):
         return False
     if located and is_on_section(located[0][0]):
@@ -84,7 +84,7 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         elif ends_at(orbit, side, bifurcation, point, settings):
             return True
     reached = after if limit is None else limit[0]
-    if (reached.tests[:-EXTRA] < -VIOLATED).any():
+    if violates(reached):
         side.drop_tip()
         if is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
@@ -98,6 +98,11 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if stop is not None and limit[0] is stop.point:
         side.end = stop.end
     return True
+
+
+def violates(point: Point) -> bool:
+    """Tell whether a condition is violated at a point, by more than a located event is off by rounding."""
+    return bool((point.tests[:-EXTRA] < -VIOLATED).any())
 
 
 def _is_beyond(point: Point, limit: Point, step: float, settings: Settings) -> bool:

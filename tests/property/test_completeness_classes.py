@@ -245,6 +245,16 @@ def test_what_is_not_located_in_one_step_is_located_in_a_shorter_one(
     assert not cf.explore(orbit, "Omega", restarts.scene(42, 56).range).loose_ends
 
 
+def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
+    """Damping of 1e-9: a bridge ends 1e-8 from a branch point, nearer than what leaves it can be started."""
+    found = restarts.scene(42, 56)
+    for damping in (7e-10, 2e-9, 3e-9):
+        orbit = cf.find_orbit("coulomb", {**found.params, "zeta": damping}, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert len(explored.of_kind("BP")) > 1 and not explored.loose_ends
+        assert all(o.admissible for branch in explored.branches for o in branch), damping
+
+
 def test_orbits_on_a_curve_that_turns() -> None:
     """Through folds: both sides are solved, and the parameter is on one side of the fold."""
     checked = 0
