@@ -255,6 +255,19 @@ def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
         assert all(o.admissible for branch in explored.branches for o in branch), damping
 
 
+def test_each_sequence_of_arms_is_one_branch() -> None:
+    """What passes a fold ends there, or goes on with all arms exchanged: one bridge was there twice."""
+    found = restarts.scene(36, 36)
+    for share in (0.005, -0.002):
+        params = {**found.params, "S": found.params["S"] * (1.0 + share), "h": 0.14}
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        explored = cf.explore(orbit, "h", (0.11, 0.145), max_periods=3)
+        (node,) = [n for n in explored.events if n.bifurcation.kind == "SN" and not n.mirrored]
+        assert len(node.branches) > 20  # sequences of up to six half periods
+        balances = explored.verify(restarts=0).balances
+        assert len(balances) > 30 and all(balance.holds for balance in balances), share
+
+
 def test_orbits_on_a_curve_that_turns() -> None:
     """Through folds: both sides are solved, and the parameter is on one side of the fold."""
     checked = 0
