@@ -255,6 +255,7 @@ def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
         assert all(o.admissible for branch in explored.branches for o in branch), damping
 
 
+@pytest.mark.slow
 def test_each_sequence_of_arms_is_one_branch() -> None:
     """What passes a fold ends there, or goes on with all arms exchanged: one bridge was there twice."""
     found = restarts.scene(36, 36)
