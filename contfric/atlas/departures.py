@@ -13,6 +13,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
 from contfric.continuation.events import End, EndReason, Kind, Verdict
 from contfric.continuation.points import FIRST_STEP, Settings
+from contfric.continuation.resolve import violates
 from contfric.continuation.side import Side
 from contfric.continuation.switching import (
     NEARER,
@@ -71,8 +72,8 @@ def _departures(
     overshot: list[float] = []
     for distance in chain(NEARER, overshot):  # those that overshoot something come last
         departure = leave_along(orbit, settings, along, reason.value, distance)
-        if departure is None:
-            continue
+        if departure is None or violates(departure.point):
+            continue  # nothing is there, or a condition has been violated on the way
         there = departure.point.orbit(orbit.system, orbit.vector, active)
         if shortest(there) is not there:
             continue  # Newton has fallen back on the orbit that it is to leave

@@ -75,7 +75,7 @@ def follow_arms(state: Exploration, event: Event) -> bool:
             continue
         for sequence in necklaces(arms.letters, length):
             exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
-            _try_arms(state, event, beside, sequence, sequence == exchanged)
+            _try_arms(state, event, beside, sequence, exchanged)
     return True
 
 
@@ -89,9 +89,13 @@ def _try_arms(
     event: Event,
     beside: list[tuple[float, Arms]],
     sequence: tuple[int, ...],
-    comes_back: bool,
+    exchanged: tuple[int, ...],
 ) -> None:
-    """Try one sequence; where it comes back through the fold as itself, or its image, to one side of it."""
+    """Try one sequence; its curve goes on through the fold as the one with all arms exchanged.
+
+    It is traced to one side of the fold where that is the same, or its image, or is known already: a branch
+    may end at the fold, or pass it, as its vertex is seen or not.
+    """
     reason = _reason(beside[0][1], sequence)
     for _, arms in beside:
         there = arms.orbit(sequence)
@@ -101,7 +105,8 @@ def _try_arms(
             state.judge(event, reason, Verdict.KNOWN, known)
             return
         settings = settings_for(there, state.settings)
-        if not comes_back:
+        beyond = there if sequence == exchanged else arms.orbit(exchanged)
+        if beyond is not there and not (beyond.converged and state.known(beyond) is not None):
             state.accept(event, reason, whole_branch(there, settings))
             return
         point = first_point(there, settings)

@@ -49,7 +49,8 @@ def fold_between(
     """
     between = parabola_vertex(before, after, share)
     vertex = _fold(orbit, before, beyond, between, settings)
-    if vertex[0].kind is not Kind.SN:
+    # a fold of simpler orbits is located on these
+    if vertex[0].kind is not Kind.SN or vertex[0].orbit.system.segments < orbit.system.segments:
         return [vertex]
     crossing = _vertex_of_crossing(orbit, before, after, beyond, share, settings)
     if crossing is not None:

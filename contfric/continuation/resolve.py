@@ -49,7 +49,8 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
         side.end = End(EndReason.POINT)
         return True
-    if _comes_closer(side, located, after.arc - before.arc):
+    missed = not located and limit is None and violates(after)
+    if _comes_closer(side, located, missed, after.arc - before.arc):
         return False
     if located and is_on_section(located[0][0]):
         side.drop_tip()
@@ -83,7 +84,7 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         elif ends_at(orbit, side, bifurcation, point, settings):
             return True
     reached = after if limit is None else limit[0]
-    if (reached.tests[:-EXTRA] < -VIOLATED).any():
+    if violates(reached):
         side.drop_tip()
         if is_at_limit(side.tip.value, settings):
             side.end = limit_end(side.tip.value, settings)
@@ -97,6 +98,11 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if stop is not None and limit[0] is stop.point:
         side.end = stop.end
     return True
+
+
+def violates(point: Point) -> bool:
+    """Tell whether a condition is violated at a point, by more than a located event is off by rounding."""
+    return bool((point.tests[:-EXTRA] < -VIOLATED).any())
 
 
 def _is_beyond(point: Point, limit: Point, step: float, settings: Settings) -> bool:
@@ -124,13 +130,17 @@ def _is_known(
     return is_known_touch(side, point)
 
 
-def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
+def _comes_closer(
+    side: Side, located: list[tuple[Bifurcation, Point]], missed: bool, step: float
+) -> bool:
     """Go back to the point before an event near which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
-    across may end on the other curve, and what is between its ends belongs to neither.
+    across may end on the other curve, and what is between its ends belongs to neither. And where a slide has
+    exactly no length the equations may have no pivot by rounding: a condition that is violated after a step
+    is ``missed`` if its location is just that, and no other trial is solved as well.
     """
-    fails = any(point.lost or point.rough for _, point in located)
+    fails = missed or any(point.lost or point.rough for _, point in located)
     if not fails or step < NEAREST:
         return False
     side.drop_tip()

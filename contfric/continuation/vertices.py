@@ -77,7 +77,8 @@ def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
     """Return the symmetric (undoubled) orbit that a bridge has come to at a fold of both; None if far.
 
     Where holds turn by themselves, each is longer or shorter beyond the fold: the branch on which two of them
-    change their lengths with each other passes the orbit at which they are the same.
+    change their lengths with each other passes the orbit at which they are the same. That may itself be a
+    shorter one, run through twice: each passage of it has a null vector of its own.
     """
     if not orbit.system.holds:
         return None
@@ -85,6 +86,8 @@ def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
         if part is None or np.max(np.abs(part.joints - orbit.joints[: len(part.joints)])) > _ODD:
             continue
         null = null_vectors(part.system, part.joints, part.vector)
+        if len(null) > 1 and (shorter := simpler_fold(part, settings)) is not None:
+            return shorter
         point = first_point(part, settings, null[0], 0.0) if len(null) == 1 else None
         if point is not None and np.max(np.abs(point.joints - part.joints)) < _ODD:
             return point.orbit(part.system, part.vector, part.model.index_of(settings.parameter))
