@@ -1,6 +1,7 @@
 """An orbit in one mode with joints on a section as well, for what follows when its other joints vanish.
 
-An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth after the event.
+An orbit whose only joint is an impact that comes to graze, or a rest that vanishes, goes on without any: it is
+smooth after the event.
 So that both are itineraries of one solution, joints are put where the solution crosses a section.
 """
 
@@ -14,6 +15,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import is_smooth
+from contfric.orbit.slides import SHORT, time_unit
 from contfric.orbit.system import build_system
 
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
@@ -25,13 +27,15 @@ _AS_FAST = 1e-6
 def divided(whole: Orbit, turns: int) -> Orbit | None:
     """Return a whole orbit with joints on a section too, where all of it is in one mode.
 
-    One each way in each of the equal ``turns`` of the motion. None where there is no section, or where it is
-    of no use.
+    One each way in each of the equal ``turns`` of the motion. Rest of no length at a touch vanishes with it. None
+    where there is no section, or where it is of no use.
     """
     model, mode = whole.model, whole.model.whole_mode(whole.itinerary[0][0])
     sections = {s for part, s in model.sections if model.whole_mode(part) == mode}
-    others = [pair for pair in whole.itinerary if model.whole_mode(pair[0]) != mode]
-    if not sections or others or whole.system.holds or is_smooth(model, whole.itinerary):
+    lasts = whole.ends[:, 0] - whole.begins[:, 0]
+    others = [model.whole_mode(pair[0]) != mode for pair in whole.itinerary]
+    stays = not np.any(lasts[others] > SHORT * time_unit(whole))
+    if not sections or not stays or is_smooth(model, whole.itinerary):
         return None
     surface = min(sections, key=model.surface_index.__getitem__)
     chosen = _by_turns(whole, surface, turns)
@@ -69,7 +73,9 @@ class _Crossing:
 
 def _by_turns(whole: Orbit, surface: str, turns: int) -> list[_Crossing]:
     """Return the fastest crossings of a surface, one each way in each turn."""
-    every = [c for i in range(len(whole.itinerary)) for c in _inside(whole, i, surface)]
+    mode = whole.model.whole_mode(whole.itinerary[0][0])
+    stays = [i for i, (own, _) in enumerate(whole.itinerary) if whole.model.whole_mode(own) == mode]
+    every = [c for i in stays for c in _inside(whole, i, surface)]
     ways = {way: [c for c in every if c.way == way] for way in (-1, 1)}
     if not all(ways.values()):
         return []
