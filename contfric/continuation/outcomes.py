@@ -278,7 +278,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
     if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length * time_unit(orbit):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
-            return Outcome(*_goes_on(orbit, before % len(itinerary), h, behind), reason)
+            return Outcome(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
         return Outcome(drop(h), {}, reason)
     if location.margin is Margin.JOINT:
         reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
@@ -363,15 +363,7 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
             f"the impact after segment {i + 1} changes the mode: it cannot be left out"
         )
     reason = f"no impact on {location.surface} after segment {i + 1}"
-    return Outcome(*_goes_on(orbit, i, behind), reason)
-
-
-def _goes_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, dict[Origin, FloatArray]]:
-    """Return the edit, and its joints, by which segment ``i`` goes on to the end of the last of those behind it."""
-    end = orbit.itinerary[behind[-1]]
-    if end in orbit.model.sections:  # its mode says from which side it is crossed
-        return Edit(frozenset({i, *behind}), {}, {i: (end,)}), {(i, 0): orbit.cycle[i]}
-    return Edit(frozenset(behind), {i: end[1]}), {}
+    return Outcome(*slides.runs_on(orbit, i, behind), reason)
 
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
