@@ -186,7 +186,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
 def _meeting(
     state: Exploration, orbit: Orbit, event: Event, elsewhere: list[Branch]
 ) -> tuple[Branch | None, list[End]]:
-    """Return the branch next to an orbit that ends at an event, and those ends; others go to ``elsewhere``."""
+    """Return the branch next to an orbit that ends at an event, and those ends; others go ``elsewhere``."""
     for branch in _each_through(state, orbit, elsewhere):
         ends = [end for end in branch.ends if meets(end, event, state.settings)]
         if ends and not fault_of(branch):
