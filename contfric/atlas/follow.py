@@ -9,7 +9,7 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from contfric.atlas.leaving_event import (
     leave_singular,
     settings_for,
 )
-from contfric.atlas.matching import SAME_SOLUTION, same_kind
+from contfric.atlas.matching import SAME_SOLUTION, on_branch, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -154,6 +154,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     refused: dict[Itinerary, str] = {}
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
+    elsewhere: list[Branch] = []
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         itinerary = canonical_itinerary(guess.itinerary, orbit.model)
@@ -163,9 +164,8 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             creeps.add(itinerary)
             refused.setdefault(itinerary, f"no periodic solution is {show(guess.itinerary)}")
             continue
-        branch = _through(state, guess)
-        ends = [] if branch is None else [e for e in branch.ends if meets(e, event, settings)]
-        if branch is None or not ends or fault_of(branch, state.settings.width):
+        branch, ends = _meeting(state, guess, event, elsewhere)
+        if branch is None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
@@ -181,6 +181,18 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     alone = creeps == refused.keys() or len(orbit.system.layout.conserved) > 0
     if creeps and alone and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
+
+
+def _meeting(
+    state: Exploration, orbit: Orbit, event: Event, elsewhere: list[Branch]
+) -> tuple[Branch | None, list[End]]:
+    """Return the branch next to an orbit that ends at an event, and those ends; others go ``elsewhere``."""
+    for branch in _each_through(state, orbit, elsewhere):
+        ends = [end for end in branch.ends if meets(end, event, state.settings)]
+        if ends and not fault_of(branch, state.settings.width):
+            return branch, ends
+        elsewhere.append(branch)
+    return None, []
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
@@ -346,12 +358,23 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     """Return the branch through an orbit at which it may be singular, from just next to it."""
-    settings = state.settings
-    guesses = (next_to(orbit, settings, share) for share in SHARES)
-    for solved in (refine(guess) for guess in guesses if guess is not None):
-        if solved.converged and solved.admissible:
-            return whole_branch(shortest(solved), settings)
-    return None
+    return next(_each_through(state, orbit, ()), None)
+
+
+def _each_through(state: Exploration, orbit: Orbit, known: Sequence[Branch]) -> Iterator[Branch]:
+    """Yield the branches from next to an orbit, but those that are ``known`` when they are met.
+
+    A branch may be as short as an event and a doubling next to it are near: what is found at some distance is
+    another one then, and from nearer it is found.
+    """
+    for share in SHARES:
+        guess = next_to(orbit, state.settings, share)
+        solved = None if guess is None else refine(guess)
+        if solved is None or not (solved.converged and solved.admissible):
+            continue
+        there = shortest(solved)
+        if not any(on_branch(there, branch) for branch in known):
+            yield whole_branch(there, state.settings)
 
 
 # ------------------------------------------------------------------------- period doubling

@@ -278,8 +278,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
     if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length * time_unit(orbit):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
-            fused = Edit(frozenset({h, behind}), {before % len(itinerary): itinerary[behind][1]})
-            return Outcome(fused, {}, reason)
+            return Outcome(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
         return Outcome(drop(h), {}, reason)
     if location.margin is Margin.JOINT:
         reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
@@ -364,10 +363,7 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
             f"the impact after segment {i + 1} changes the mode: it cannot be left out"
         )
     reason = f"no impact on {location.surface} after segment {i + 1}"
-    if itinerary[behind] in orbit.model.sections:  # its mode says from which side it is crossed
-        edit = Edit(frozenset({i, behind}), {}, {i: (itinerary[behind],)})
-        return Outcome(edit, {(i, 0): orbit.cycle[i]}, reason)
-    return Outcome(Edit(frozenset({behind}), {i: itinerary[behind][1]}), {}, reason)
+    return Outcome(*slides.runs_on(orbit, i, behind), reason)
 
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:

@@ -63,16 +63,24 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     itinerary = orbit.itinerary
     j %= len(itinerary)
     lasts = orbit.ends[j, 0] - orbit.cycle[j, 0]
-    same = itinerary[j - 1][0] == itinerary[(j + 1) % len(itinerary)][0]
+    before, behind = itinerary[j - 1][0], itinerary[(j + 1) % len(itinerary)][0]
+    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
     return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))
 
 
 def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, dict[tuple[int, int], FloatArray], str]:
     """Return the edit that makes one segment of two between which motion only touches a surface, and why."""
     count = len(orbit.itinerary)
-    behind = (j + 1) % count
-    edit = Edit(frozenset({j, behind}), {(j - 1) % count: orbit.itinerary[behind][1]})
-    return edit, {}, f"segment {j + 1} vanishes: its surface is only touched"
+    reason = f"segment {j + 1} vanishes: its surface is only touched"
+    return *runs_on(orbit, (j - 1) % count, j, (j + 1) % count), reason
+
+
+def runs_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, dict[tuple[int, int], FloatArray]]:
+    """Return the edit, and its joints, that lets segment ``i`` go on to the end of the last one behind it."""
+    end = orbit.itinerary[behind[-1]]
+    if end in orbit.model.sections:  # its mode says from which side it is crossed
+        return Edit(frozenset({i, *behind}), {}, {i: (end,)}), {(i, 0): orbit.cycle[i]}
+    return Edit(frozenset(behind), {i: end[1]}), {}
 
 
 def slip_at_touch(

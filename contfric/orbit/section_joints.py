@@ -1,6 +1,7 @@
 """An orbit in one mode with joints on a section as well, for what follows when its other joints vanish.
 
-An orbit whose only joint is an impact that comes to graze goes on without any: it is smooth after the event.
+An orbit whose only joint is an impact that comes to graze, or a rest that vanishes, goes on without any: it
+is smooth after the event.
 So that both are itineraries of one solution, joints are put where the solution crosses a section.
 """
 
@@ -26,8 +27,8 @@ _AS_FAST = 1e-6
 def divided(whole: Orbit, turns: int) -> Orbit | None:
     """Return a whole orbit with joints on a section too, where all of it that lasts is in one mode.
 
-    One each way in each of the equal ``turns`` of the motion. None where there is no section, or where it is
-    of no use.
+    One each way in each of the equal ``turns`` of the motion. Rest of no length at a touch vanishes with it.
+    None where there is no section, or where it is of no use.
     """
     model = whole.model
     lasts = whole.ends[:, 0] - whole.cycle[:, 0]

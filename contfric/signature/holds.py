@@ -134,7 +134,7 @@ def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
     elif ends_rest(model, *before):
         found = release_mode(model, hold[0], before[1])
     else:
-        found = before[0]
+        found = model.whole_mode(before[0])  # a part of it that ends on a section, otherwise
     if found is None:
         raise NotationError(f"no '{hold[1]}' of model '{model.name}' can follow {before}")
     return found

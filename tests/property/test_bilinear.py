@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 
@@ -61,3 +62,34 @@ def test_the_doubling_is_one(diagram):
     ]
     multipliers = np.linalg.eigvals(np.array(columns).T)
     assert np.abs(multipliers + 1.0).min() < 1e-4
+
+
+BILINEAR = """
+name: bilinear
+states: [x, v]
+parameters: {omega: 0.89, k: 20.634, zeta: 0.04128, gap: -0.0733, A: 1.0545}
+period: 2*pi/omega
+surfaces:
+  contact: {observable: x, level: gap}
+  stop: {observable: v}
+field: {x: v, v: "-x - 2*zeta*v - k*max(x - gap, 0) + A*cos(omega*t)"}
+modes:
+  pressed: {in: {contact: +}}
+  free: {in: {contact: -}}
+"""
+
+
+def test_a_branch_between_a_doubling_and_a_grazing_is_found_from_both(tmp_path: Path) -> None:
+    """It is 2e-5 of the parameter wide: a little farther from the grazing its orbits are of one period."""
+    model = typed(tmp_path, BILINEAR)
+    for seed in range(3):
+        rng = np.random.default_rng([612, seed])
+        names = ("k", "zeta", "gap", "A")
+        moved = {n: float(model.defaults[n] * rng.uniform(0.98, 1.02)) for n in names}
+        orbit = cf.find_orbit(model, moved, longest=1000)
+        found = cf.explore(orbit, "omega", (0.88, 0.95), max_periods=2)
+        assert not found.loose_ends
+        narrow = [b for b in found.branches if np.ptp(b.values) < 1e-4]
+        assert [b.system.periods for b in narrow] == [2]
+        checked = found.verify(3)  # from the branch beyond the grazing, too
+        assert checked.passed, str(checked)
