@@ -45,8 +45,8 @@ _GRID = 48
 #: Rounds of the motion before Newton: a stable itinerary contracts the error of 1e-3 to far below the length
 #: of its sticks.
 _ROUNDS = 4
-#: Resolution of the place of a change of sign.
-_RESOLUTION = 1e-15
+#: Steps towards one change of sign, and the resolution of its place: the method needs about ten.
+_MOST_STEPS, _RESOLUTION = 60, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,13 +284,20 @@ def _margins(start: Orbit, parameter: str, value: float, stops: list[int]) -> Fl
 
 
 def _root(start: Orbit, parameter: str, low: float, high: float, stop: int) -> float:
-    """Return where a margin vanishes in a bracket; the middle where Newton fails on the way."""
-    from scipy.optimize import brentq
+    """Return where a margin vanishes in a bracket, by the Illinois method."""
 
     def margin(value: float) -> float:
         return float(_margins(start, parameter, value, [stop])[0])
 
-    try:
-        return float(brentq(margin, low, high, xtol=_RESOLUTION))
-    except ValueError:  # no number
-        return 0.5 * (low + high)
+    a, b, fa, fb = low, high, margin(low), margin(high)
+    for _ in range(_MOST_STEPS):
+        x = (a * fb - b * fa) / (fb - fa)
+        fx = margin(x)
+        if not np.isfinite(fx) or fx == 0.0 or abs(b - a) <= _RESOLUTION:
+            return x
+        if fx * fb < 0.0:
+            a, fa = b, fb
+        else:
+            fa *= 0.5
+        b, fb = x, fx
+    return b

@@ -32,7 +32,7 @@ _NODES, _BESIDE = 65, 1e-6
 #: Rounds in which D grows until it is mapped into itself, by so much more than the images ask for; samples of
 #: a side and parameters meanwhile. The side that it begins with, in periods.
 _MOST_ROUNDS, _MORE, _FEW, _FIRST = 40, 1.1, 9, 1e-9
-#: Steps to the jump, and where they and those to a release end.
+#: Newton steps to a release and to the jump, and where they end.
 _STEPS, _NEAR = 12, 1e-13
 #: Difference by which the stop's distance from the surface is differentiated, in periods.
 _STEP = 1e-5
@@ -137,9 +137,7 @@ class _Release:
         if len(on) != 1 or not model.mode_by_name[mode].sliding:
             return None
         orbit, found = self.letters["a"], (on[0], exit_)
-        view, (time, *state) = model.view(orbit.vector), orbit.joints[0]
-        observables = [model.surface_by_name[name].observable for name in found]
-        slopes = [view.gradient(name, time, np.array(state))[1:] for name in observables]
+        slopes = self._slopes(found, orbit, float(orbit.joints[0, 0]), orbit.joints[0, 1:])
         return found if np.linalg.matrix_rank(slopes) == 2 else None  # else its time is given
 
     @property
@@ -198,10 +196,20 @@ class _Release:
         orbit = self.letters[letter]
         model, vector, joints = orbit.model, orbit.vector.copy(), orbit.joints.copy()
         vector[model.index_of(self.bridge.parameter)] = value
-        view, on = model.view(vector), self.surfaces
+        view, state, on = model.view(vector), joints[0, 1:], self.surfaces
         assert on is not None
         joints[0, 0] = time
-        state = view.landed(on, time, joints[0, 1:], _NEAR)
-        if state is not None:
-            joints[0, 1:] = state
+        for _ in range(_STEPS):
+            heights = [view.height(s, time, state) for s in on]
+            if max(map(abs, heights)) < _NEAR:
+                break
+            slopes = self._slopes(on, replace(orbit, vector=vector), time, state)
+            state -= np.linalg.solve(slopes, heights)
         return replace(orbit, joints=joints, vector=vector)
+
+    def _slopes(
+        self, on: tuple[str, str], orbit: Orbit, time: float, state: FloatArray
+    ) -> FloatArray:
+        """Return the derivatives by the state of the observables of two surfaces, shape (2, 2)."""
+        view, known = orbit.model.view(orbit.vector), orbit.model.surface_by_name
+        return np.array([view.gradient(known[s].observable, time, state)[1:] for s in on])
