@@ -26,7 +26,7 @@ from contfric.atlas.leaving_event import (
     leave_singular,
     settings_for,
 )
-from contfric.atlas.matching import SAME_SOLUTION, same_kind
+from contfric.atlas.matching import SAME_SOLUTION, on_branch, same_kind
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -160,7 +160,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             creeps.add(itinerary)
             refused.setdefault(itinerary, f"no periodic solution is {show(guess.itinerary)}")
             continue
-        branch = _through(state, guess)
+        branch = _through(state, guess, once=True)
         ends = [] if branch is None else [e for e in branch.ends if meets(e, event, settings)]
         if branch is None or not ends or fault_of(branch):
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
@@ -322,13 +322,25 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
         state.accept(event, reason, branch)
 
 
-def _through(state: Exploration, orbit: Orbit) -> Branch | None:
-    """Return the branch through an orbit at which it may be singular, from just next to it."""
+def _through(state: Exploration, orbit: Orbit, once: bool = False) -> Branch | None:
+    """Return the branch through an orbit at which it may be singular, from just next to it.
+
+    Parameters
+    ----------
+    once : whether one that was traced before is not traced again: motions near several events may walk its
+        itinerary, and it ends at one of them
+    """
     settings = state.settings
     guesses = (next_to(orbit, settings, share) for share in SHARES)
     for solved in (refine(guess) for guess in guesses if guess is not None):
         if solved.converged and solved.admissible:
-            return whole_branch(shortest(solved), settings)
+            start = shortest(solved)
+            traced = (*state.branches, *state.elsewhere) if once else ()
+            known = next((branch for branch in traced if on_branch(start, branch)), None)
+            if known is None:
+                known = whole_branch(start, settings)
+                state.elsewhere.append(known)
+            return known
     return None
 
 
