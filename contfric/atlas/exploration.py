@@ -57,6 +57,8 @@ class Exploration:
     waiting: deque[Event] = field(default_factory=deque)
     notes: list[str] = field(default_factory=list)
     complete: bool = True
+    #: Traced for an event that they do not meet: another event may ask for them.
+    elsewhere: list[Branch] = field(default_factory=list)
 
     def add(self, branch: Branch) -> None:
         """Register a branch and the events that it meets: all of it, whenever Ctrl-C comes."""

@@ -9,7 +9,7 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -154,7 +154,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     refused: dict[Itinerary, str] = {}
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
-    elsewhere: list[Branch] = []
+    asked: list[Branch] = []
     for found in walked(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         itinerary = canonical_itinerary(guess.itinerary, orbit.model)
@@ -164,7 +164,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             creeps.add(itinerary)
             refused.setdefault(itinerary, f"no periodic solution is {show(guess.itinerary)}")
             continue
-        branch, ends = _meeting(state, guess, event, elsewhere)
+        branch, ends = _meeting(state, guess, event, asked)
         if branch is None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
@@ -184,14 +184,26 @@ def _follow_flow(state: Exploration, event: Event) -> None:
 
 
 def _meeting(
-    state: Exploration, orbit: Orbit, event: Event, elsewhere: list[Branch]
+    state: Exploration, orbit: Orbit, event: Event, asked: list[Branch]
 ) -> tuple[Branch | None, list[End]]:
-    """Return the branch next to an orbit that ends at an event, and those ends; others go ``elsewhere``."""
-    for branch in _each_through(state, orbit, elsewhere):
+    """Return the branch next to an orbit that ends at an event, and those ends; others were ``asked``.
+
+    A branch may be as short as an event and a doubling next to it are near: what is found at some distance is
+    another one then, and from nearer it is found. Motions near several events may walk the same itinerary,
+    which ends at one of them: what was traced is not traced again.
+    """
+    for near in _next_to(state, orbit):
+        if any(on_branch(near, branch) for branch in asked):
+            continue
+        traced = (*state.branches, *state.elsewhere)
+        branch = next((b for b in traced if on_branch(near, b)), None)
+        if branch is None:
+            branch = whole_branch(near, state.settings)
+            state.elsewhere.append(branch)
         ends = [end for end in branch.ends if meets(end, event, state.settings)]
         if ends and not fault_of(branch, state.settings.width):
             return branch, ends
-        elsewhere.append(branch)
+        asked.append(branch)
     return None, []
 
 
@@ -358,23 +370,16 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     """Return the branch through an orbit at which it may be singular, from just next to it."""
-    return next(_each_through(state, orbit, ()), None)
+    return next((whole_branch(near, state.settings) for near in _next_to(state, orbit)), None)
 
 
-def _each_through(state: Exploration, orbit: Orbit, known: Sequence[Branch]) -> Iterator[Branch]:
-    """Yield the branches from next to an orbit, but those that are ``known`` when they are met.
-
-    A branch may be as short as an event and a doubling next to it are near: what is found at some distance is
-    another one then, and from nearer it is found.
-    """
+def _next_to(state: Exploration, orbit: Orbit) -> Iterator[Orbit]:
+    """Yield orbits that are solved next to one at which its branch may be singular, nearer and nearer."""
     for share in SHARES:
         guess = next_to(orbit, state.settings, share)
         solved = None if guess is None else refine(guess)
-        if solved is None or not (solved.converged and solved.admissible):
-            continue
-        there = shortest(solved)
-        if not any(on_branch(there, branch) for branch in known):
-            yield whole_branch(there, state.settings)
+        if solved is not None and solved.converged and solved.admissible:
+            yield shortest(solved)
 
 
 # ------------------------------------------------------------------------- period doubling

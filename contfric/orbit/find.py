@@ -183,6 +183,15 @@ def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
     return orbit
 
 
+def _walls_met(trajectory: Trajectory) -> list[str]:
+    """Return the walls that a solution is on where it ends."""
+    model, (_, time, state, _) = trajectory.model, trajectory.last
+    flow = model.view(model.vector(trajectory.params))
+    size = _EXACT * (1.0 + float(np.max(np.abs(state))))
+    walls = dict.fromkeys(reset.surface for reset in model.resets)
+    return [wall for wall in walls if abs(flow.height(wall, time, state)) < size]
+
+
 def _check_motion(trajectory: Trajectory) -> None:
     if trajectory.end is SimulationEnd.QUIET and (why := goes_on(trajectory)):
         raise ConvergenceError(f"no periodic orbit: {why}", trajectory)
@@ -193,6 +202,12 @@ def _check_motion(trajectory: Trajectory) -> None:
             if trajectory.model.composed:
                 why += " (where nothing slips, orbits are found for up to four contacts that share no load)"
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
+        if missing and len(walls := _walls_met(trajectory)) > 1:
+            raise ConvergenceError(
+                f"no periodic orbit: {' and '.join(map(repr, walls))} are hit at the same time, which is not "
+                "offered: set one of them back a little (by a thousandth), or start elsewhere (state=...)",
+                trajectory,
+            )
         says = "; `contfric check` says where no mode follows" if missing else ""
         raise ConvergenceError(
             f"no periodic orbit: {why}. Choose other parameters or another start{says}",

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.points import settings_of
+from contfric.atlas import follow
+from contfric.atlas.crossings import whole_branch
+from contfric.continuation.points import Settings, settings_of
 from contfric.continuation.side import first_point
 from contfric.curves.points import solve_point
 from contfric.curves.problem import border_of, problem_of
@@ -93,3 +95,32 @@ def test_a_segment_of_many_turns_is_given_up(model: str) -> None:
         joints = orbit.joints.copy()
         joints[which, 0] += 1e-3 * turn * draw.standard_normal()
         assert refine(replace(orbit, joints=joints)).converged
+
+
+@pytest.mark.slow
+def test_no_branch_is_traced_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Motions near several events walk the itinerary of one branch: it is traced for one of them."""
+    play = {"kind": "spring", "stiffness": "6"}
+    model = cf.Mechanism(
+        [["1", "0"], ["0", "2"]],
+        [["0.1", "0"], ["0", "0.05"]],
+        [["0.2", "0"], ["0", "0.4"]],
+        contacts={
+            "front": {**play, "gap": "0.3 - q1 + q2"},
+            "back": {**play, "gap": "0.3 + q1 - q2"},
+            "bearing": {"kind": "friction", "velocity": "v2", "kinetic": "0.1", "static": "0.13"},
+        },
+        force={"q1": "0.1 + 0.6*cos(w*t)"},
+        parameters={"w": 0.9},
+        period="2*pi/w",
+    )
+    traced: list[cf.Branch] = []
+
+    def kept(orbit: cf.Orbit, settings: Settings) -> cf.Branch:
+        traced.append(whole_branch(orbit, settings))
+        return traced[-1]
+
+    monkeypatch.setattr(follow, "whole_branch", kept)
+    cf.explore(cf.find_orbit(model), "w", (0.7, 1.1), max_branches=17)
+    spans = [(b.name, round(b.values.min(), 6), round(b.values.max(), 6)) for b in traced]
+    assert len(set(spans)) == len(spans) > 5

@@ -622,3 +622,21 @@ def test_a_preloaded_train_of_four_gaps_moves_as_a_linear_one(seed: int) -> None
         assert y[:n] == pytest.approx(mean + np.real(wave * np.exp(1j * w * t)), abs=1e-9)
     assert orbit.admissible
     assert orbit.stable
+
+
+def test_walls_hit_at_the_same_time_are_named() -> None:
+    """Equal masses hit equal walls together; set back a little, one after the other."""
+    side = {"kind": "impact", "restitution": 0.6}
+    model = cf.Mechanism(
+        np.eye(2),
+        0.05 * np.eye(2),
+        np.array([[1.3, -0.3], [-0.3, 1.3]]),
+        contacts={"left": {**side, "gap": "0.8 - q1"}, "right": {**side, "gap": "0.8 + b - q2"}},
+        force={"q1": "cos(w*t)", "q2": "cos(w*t)"},
+        parameters={"w": 0.8, "b": 0.0},
+        period="2*pi/w",
+    )
+    with pytest.raises(cf.ConvergenceError, match="'left' and 'right' are hit at the same time"):
+        cf.find_orbit(model)
+    apart = cf.find_orbit(model, {"b": 1e-3})
+    assert [surface for _, surface in apart.itinerary] == ["left", "right"] and apart.stable
