@@ -22,7 +22,7 @@ NEAR = 0.02
 #: Stable component, relative to that distance, at which the unstable one decides.
 _ARRIVED = 1e-6
 #: Share of the unstable component u below which the stable one, s, does not matter: the stable set is
-#: u = a s**2 there, far below u. The unstable set is curved as well: at a thousandth solutions had left before
+#: u = a s**2 there, far below u. The unstable set is curved too: at a thousandth solutions had left before
 #: it was reached, and u vanished far away, where it says nothing.
 _SMALL = 0.1
 #: Returns that a start may take to the saddle, and at it.
