@@ -187,7 +187,7 @@ def test_overlay() -> None:
         diagram.plot(overlay=other)
     strobed = cf.sweep("coulomb", "Omega", [0.45, 0.5], section=0.0)
     for row in ("psi", "stops"):  # where the velocity vanishes: a phase is anywhere else
-        with pytest.raises(cf.ParameterError, match="section 0.0: sweep.*section='stops'"):
+        with pytest.raises(cf.ParameterError, match=r"section 0\.0: sweep.*section='stops'"):
             diagram.plot(row=row, overlay=strobed)
     released = cf.sweep("coulomb", "Omega", [0.45, 0.5], orbit.params, section="releases")
     diagram.plot(row="stops", overlay=released)
