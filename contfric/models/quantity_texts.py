@@ -85,6 +85,8 @@ def read(text: str) -> Parsed:
     >>> found = read("max(x) - S*period")
     >>> sorted(found.names), [f.text for f in found.functionals.values()]
     (['S', 'period'], ['x'])
+    >>> len(read("(max(x) + min(x))/(max(x) - min(x))").functionals)
+    2
     """
     try:
         tree = ast.parse(" ".join(str(text).split()), mode="eval").body
@@ -97,10 +99,11 @@ def read(text: str) -> Parsed:
 
 
 class _Taking(ast.NodeTransformer):
-    """Takes functionals out of a tree, and leaves a name in the place of each."""
+    """Takes functionals out of a tree, and leaves a name in the place of each; one for equal ones."""
 
     def __init__(self, found: dict[str, Functional]) -> None:
         self.found = found
+        self.names: dict[str, str] = {}
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Take a functional out; other calls are looked through."""
@@ -111,8 +114,10 @@ class _Taking(ast.NodeTransformer):
         several = kind in ("max", "min") and len(node.args) != 1
         if kind not in (*FUNCTIONALS, WORK) or several:
             return self.generic_visit(node)
-        name = f"_{len(self.found)}"
-        self.found[name] = _functional(kind, node)
+        text = ast.unparse(node)
+        name = self.names.setdefault(text, f"_{len(self.found)}")
+        if name not in self.found:
+            self.found[name] = _functional(kind, node)
         return ast.copy_location(ast.Name(name, ast.Load()), node)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -20,12 +21,25 @@ _KINK = 0.1
 NEAR = 0.02
 #: Stable component, relative to that distance, at which the unstable one decides.
 _ARRIVED = 1e-6
+#: Share of the unstable component u below which the stable one, s, does not matter: the stable set is
+#: u = a s**2 there, far below u. The unstable set is curved too: at a thousandth solutions had left before
+#: it was reached, and u vanished far away, where it says nothing.
+_SMALL = 0.1
 #: Returns that a start may take to the saddle, and at it.
 _ARRIVALS, _RETURNS = 40, 400
 
 
+class SpentError(Exception):
+    """The returns that a stretch may take are used up."""
+
+
 class SectionMap:
-    """The section map at a phase, and its saddle with both directions."""
+    """The section map at a phase, and its saddle with both directions.
+
+    Attributes
+    ----------
+    returns, most : how often the map was taken, and how often it may be
+    """
 
     def __init__(self, orbit: Orbit, phase: float) -> None:
         self.orbit, self.phase = orbit, phase % 1.0
@@ -33,9 +47,19 @@ class SectionMap:
         self.periods = orbit.periods
         self.saddle = orbit.state(self.time)
         self.size = float(np.max(np.ptp(orbit.trajectory(100)[1], axis=0)))
+        self.returns, self.most = 0, math.inf
 
     def returned(self, state: FloatArray) -> FloatArray | None:
-        """Return f at a state; None where the solution does not come back."""
+        """Return f at a state; None where the solution does not come back.
+
+        Raises
+        ------
+        SpentError
+            If it may not be taken more often.
+        """
+        if self.returns >= self.most:
+            raise SpentError
+        self.returns += 1
         model, vector = self.orbit.model, self.orbit.vector
         try:
             mode, on = start_of(model, self.time, state, vector, None)
@@ -47,14 +71,14 @@ class SectionMap:
         return np.array(ended.last[2]) if ended.end.name == "TIME" else None
 
     @cached_property
-    def _eigen(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Stable unit vector; functionals that take the unstable and the stable component."""
+    def _eigen(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Stable vector; functionals of the unstable and the stable component; sign of the growth."""
         step = _DIFFERENCE * self.size
         columns = [self._slope(direction, step) for direction in np.eye(2)]
         values, right = np.linalg.eig(np.array(columns).T)
         values, right = np.real(values), np.real(right)
         stable, left = np.argmin(np.abs(values)), np.linalg.inv(right)
-        return right[:, stable], left[1 - stable], left[stable]
+        return right[:, stable], left[1 - stable], left[stable], float(np.sign(values[1 - stable]))
 
     def _slope(self, direction: FloatArray, step: float) -> FloatArray:
         """Return the derivative of f at the saddle in a direction; that of one side where f jumps.
@@ -80,18 +104,22 @@ class SectionMap:
         return self._eigen[0]
 
     def departure(self, state: FloatArray) -> float | None:
-        """Return the unstable component with which a start has come to the saddle; None if it has not."""
-        _, growing, shrinking = self._eigen
-        came = False
+        """Return the unstable component with which a start has come to the saddle; None if it has not.
+
+        Where the unstable multiplier is negative each return turns its sign: counted back to the start, it
+        tells the sides of the stable set whatever the number of returns is.
+        """
+        _, growing, shrinking, turns = self._eigen
+        came, last = False, 0.0
         for count in range(_RETURNS):
             apart = state - self.saddle
             unstable, stable = float(growing @ apart), abs(float(shrinking @ apart))
             near = np.hypot(*apart) < NEAR * self.size
-            came = came or bool(near)
-            if came and (
-                not near or stable < max(_ARRIVED * self.size * NEAR, 1e-3 * abs(unstable))
-            ):
-                return unstable
+            if came and not near:
+                return last
+            came, last = came or bool(near), unstable * turns**count
+            if came and stable < max(_ARRIVED * self.size * NEAR, _SMALL * abs(unstable)):
+                return last
             if not came and count >= _ARRIVALS:
                 return None
             following = self.returned(state)

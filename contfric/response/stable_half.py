@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
 from itertools import pairwise
@@ -12,7 +13,7 @@ from contfric.chaos.running import Progress
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.remember.journal import remembered
-from contfric.response.section_map import NEAR, SectionMap
+from contfric.response.section_map import NEAR, SectionMap, SpentError
 
 #: Halves of the arc on which the next point is looked for (rad), and the turn that is accepted. Starts at the
 #: ends of a narrow arc come to the saddle from farther away.
@@ -34,6 +35,7 @@ class StableEnd(str, Enum):
         "the section map jumps: solutions on one side stop, or touch a surface, where others do not"
     )
     POINTS = "the largest number of points was reached"
+    RETURNS = "the largest number of returns of the section map was reached"
     INTERRUPTED = "interrupted"
 
 
@@ -44,6 +46,7 @@ class HalfStretch:
     Attributes
     ----------
     end : why the half ends there, None if it goes on
+    returns : how often the section map was taken
     """
 
     points: FloatArray
@@ -51,6 +54,7 @@ class HalfStretch:
     direction: FloatArray
     step: float
     end: StableEnd | None
+    returns: int
 
 
 @remembered(without=("section",), finished=lambda s: s.end is not StableEnd.INTERRUPTED)
@@ -61,7 +65,7 @@ def _stretch(
     last: FloatArray,
     direction: FloatArray,
     steps: tuple[float, float],
-    most: int,
+    most: tuple[int, int],
     section: SectionMap,
 ) -> HalfStretch:
     """Follow a half by so many points.
@@ -69,11 +73,19 @@ def _stretch(
     Parameters
     ----------
     steps : the next step, and the longest
+    most : points, and returns of the section map
     section : the section map of the orbit at the phase
     """
     half = Half(section, [last], direction, *corners)
-    step, end = half.grow(*steps, most)
-    return HalfStretch(np.array(half.points[1:]), half.breaks, half.direction, step, end)
+    before = section.returns
+    section.most = before + most[1]
+    try:
+        step, end = half.grow(*steps, most[0])
+    finally:
+        section.most = math.inf
+    points = np.array(half.points[1:]).reshape(-1, len(last))
+    taken = section.returns - before
+    return HalfStretch(points, half.breaks, half.direction, step, end, taken)
 
 
 @dataclass
@@ -86,11 +98,18 @@ class Half:
     low: FloatArray
     high: FloatArray
     breaks: list[int] = field(default_factory=list)
+    returns: int = 0
 
-    def trace(self, step: float, longest: float, most: int, progress: Progress | None) -> StableEnd:
-        """Follow it to its end, stretch by stretch."""
+    def trace(
+        self,
+        step: float,
+        longest: float,
+        most: tuple[int, int],
+        progress: Progress | None,
+    ) -> StableEnd:
+        """Follow it to its end, stretch by stretch: so many points, and returns of the section map."""
         try:
-            while len(self.points) < most:
+            while len(self.points) < most[0]:
                 step, end = self._add_stretch(step, longest, most)
                 if progress is not None:
                     where = ", ".join(f"{value:.6g}" for value in self.points[-1])
@@ -102,17 +121,19 @@ class Half:
         return StableEnd.POINTS
 
     def _add_stretch(
-        self, step: float, longest: float, most: int
+        self, step: float, longest: float, most: tuple[int, int]
     ) -> tuple[float, StableEnd | None]:
         """Return the next step, and why it ends if it does."""
+        left = min(_STRETCH, most[0] - len(self.points)), most[1] - self.returns
         count, corners = len(self.points), (self.low, self.high)
         found = _stretch(
             *(self.section.orbit, self.section.phase, corners, self.points[-1], self.direction),
-            *((step, longest), min(_STRETCH, most - count), self.section),
+            *((step, longest), left, self.section),
         )
         self.breaks += [count - 1 + k for k in found.breaks]
         self.points += list(found.points)
         self.direction = found.direction
+        self.returns += found.returns
         return found.step, found.end
 
     def grow(self, step: float, longest: float, most: int) -> tuple[float, StableEnd | None]:
@@ -137,6 +158,8 @@ class Half:
                 step = min(longest, step * (2.0 if turn < 0.5 * _TURN else 1.0))
         except KeyboardInterrupt:
             return step, StableEnd.INTERRUPTED
+        except SpentError:
+            return step, StableEnd.RETURNS
         return step, None
 
     def _turn(self, found: FloatArray) -> float:

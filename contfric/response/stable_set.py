@@ -2,8 +2,9 @@ r"""The stable set of an unstable orbit in the plane of two states: where basins
 
 The section map f takes the state at a phase of the excitation to that one period of the orbit later. An
 unstable orbit is a saddle :math:`p_0` of f. With the left unstable eigenvector l,
-:math:`u = l^T (f^n(q) - p_0)` grows by the unstable multiplier with each return near the saddle. The stable
-set is where it vanishes; so it separates starts that leave the saddle along one direction from those that
+:math:`u = l^T (f^n(q) - p_0)` grows by the unstable multiplier m with each return near the saddle, and
+:math:`u / m^n` does not depend on n there (a negative m turns the sign of u with each return). The stable set
+is where it vanishes; so it separates starts that leave the saddle along one direction from those that
 leave along the other.
 
 It is followed without the inverse of f, as a stick has none (J. P. England, B. Krauskopf, H. M. Osinga, SIAM
@@ -108,6 +109,7 @@ def stable_set(
     phase: float = 0.0,
     max_step: float | None = None,
     max_points: int = 2000,
+    max_returns: int = 400_000,
     folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> StableSet:
@@ -126,6 +128,9 @@ def stable_set(
         Longest step along the set; by default a hundredth of the ranges.
     max_points : int
         Most points of each half.
+    max_returns : int
+        Most returns of the section map for each half, about half a minute of processor time. A set that
+        folds without end (as at the boundary of basins with holes) needs any number of them.
     folder : path, optional
         Where finished stretches are kept; the same call goes on from them.
     progress : callable, optional
@@ -157,6 +162,7 @@ def stable_set(
         else real_number("max_step", max_step, least=1e-9)
     )
     whole_number("max_points", max_points, least=2)
+    whole_number("max_returns", max_returns, least=1)
     halves, ends, breaks = [], [], []
     with kept_in(folder):
         for sign in (1.0, -1.0):
@@ -166,7 +172,7 @@ def stable_set(
             ends.append(
                 StableEnd.INTERRUPTED
                 if stopped
-                else half.trace(first, longest, max_points, progress)
+                else half.trace(first, longest, (max_points, max_returns), progress)
             )
             halves.append(np.array(half.points))
             breaks.append(np.array(half.breaks, dtype=np.int64))

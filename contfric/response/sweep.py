@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from contfric.base.extras import need_xarray
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
+from contfric.models.clocks import TICK
 from contfric.models.definition import FloatArray, Model
 from contfric.response.outcome import Outcome
 from contfric.response.sections import STOPS
@@ -146,10 +147,11 @@ class Sweep(Tabled):
             )
         return self.model.states.index(state)
 
-    @staticmethod
-    def shows(row: object) -> bool:
-        """Tell whether an overlay has a row of a diagram."""
-        return row in ROWS
+    def shows(self, row: object) -> bool:
+        """Tell whether an overlay has a row of a diagram: points at a phase have none."""
+        if self.section == STOPS:
+            return row in ROWS
+        return row == "stops" and isinstance(self.section, str) and self.section != TICK
 
     def quantity(self, row: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Yield (direction, parameter, what a diagram shows in one of its rows), for an overlay.
@@ -161,14 +163,16 @@ class Sweep(Tabled):
         """
         if row not in ROWS:
             raise ParameterError(f"a row is one of {', '.join(ROWS)}, got {shown(row)}")
-        if row != "stops" and self.section != STOPS:
+        if not self.shows(row):
             if not self.model.stop_surface:
                 raise ParameterError(
                     f"'{row}' is known at the stops, and '{self.model.name}' names no surface v = 0 "
                     "for them: draw the sweep by itself, sweep.plot()"
                 )
+            other = ", or draw row='stops'" if self.shows("stops") else ""
             raise ParameterError(
-                f"'{row}' is known at the stops: sweep(..., section='stops'), or draw row='stops'"
+                f"'{row}' is known at the stops, and the sweep has section {self.section!r}: "
+                f"sweep(..., section='stops'){other}"
             )
         for name in self.runs:
             x, y = self.points(name)

@@ -186,8 +186,13 @@ def test_overlay() -> None:
     with pytest.raises(cf.ParameterError, match="along 'S'"):
         diagram.plot(overlay=other)
     strobed = cf.sweep("coulomb", "Omega", [0.45, 0.5], section=0.0)
-    with pytest.raises(cf.ParameterError, match="stops"):
-        diagram.plot(row="psi", overlay=strobed)
+    for row in ("psi", "stops"):  # where the velocity vanishes: a phase is anywhere else
+        with pytest.raises(cf.ParameterError, match=r"section 0\.0: sweep.*section='stops'"):
+            diagram.plot(row=row, overlay=strobed)
+    released = cf.sweep("coulomb", "Omega", [0.45, 0.5], orbit.params, section="releases")
+    diagram.plot(row="stops", overlay=released)
+    with pytest.raises(cf.ParameterError, match="draw row='stops'"):
+        diagram.plot(row="psi", overlay=released)
 
 
 @pytest.mark.parametrize(

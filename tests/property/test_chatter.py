@@ -451,3 +451,57 @@ def test_where_flights_shrink_to_nothing_the_mass_rests_for_ever(seed: int, tmp_
         assert not [b for b in branch.bifurcations if b.kind is cf.Kind.SN]
         # the height of a flight falls with the square of the distance: at 1e-8 the place is known to 1e-4
         assert branch.values[0] == pytest.approx(leaves, rel=1e-4) and branch.values[0] > leaves
+
+
+STOPPED = """
+name: stopped{number}
+states: [x, v]
+parameters: {{w: 0.8, e: 0.5, d: 0.3, z: 0.05, b: 0.0}}
+period: 2*pi/w
+surfaces: {{stop: {{observable: x, level: d}}}}
+field: {{x: v, v: -2*z*v - x + b + cos(w*t)}}
+modes: {{flight: {{in: {{stop: -}}}}}}
+resets: {{stop: {{v: -e*v{chatter}}}}}
+"""
+
+
+def test_impacts_that_do_not_come_to_rest_are_those_without_chatter(tmp_path: Path) -> None:
+    """Event by event, to the first chatter; and that begins no later than where impacts go on to rest."""
+    for number, chatter in enumerate(("", ", chatter: true")):
+        text = STOPPED.format(number=number, chatter=chatter)
+        (tmp_path / f"{number}.yaml").write_text(text, encoding="utf-8")
+    draw, counted = np.random.default_rng(3), [0, 0]
+    for _ in range(40):
+        p = {
+            "w": float(draw.uniform(0.15, 1.6)),
+            "e": float(draw.uniform(0.1, 0.9)),
+            "d": float(draw.uniform(0.0, 1.0)),
+            "z": float(draw.uniform(0.0, 0.2)),
+            "b": float(draw.uniform(-0.5, 1.0)),
+        }
+        start = [p["d"] - 0.2, float(draw.uniform(-1.0, 1.0))]
+        plain, found = (
+            cf.simulate(tmp_path / f"{number}.yaml", p, state=start, periods=60)
+            for number in (0, 1)
+        )
+        times, expected = (
+            [
+                c * 2.0 * np.pi / p["w"] + t
+                for c, t, surface in zip(s.cycles, s.times, s.exits, strict=True)
+                if surface == "stop"
+            ]
+            for s in (found, plain)
+        )
+        modes = [mode for mode, surface in found.itinerary if surface in ("stop", "stop_lift")]
+        rests = modes.index("chatter") if "chatter" in modes else len(times)
+        counted["chatter" in modes] += 1
+        assert times[:rests] == expected[:rests]
+        if "chatter" not in modes:
+            assert found.end is plain.end is SimulationEnd.TIME and len(times) == len(expected)
+            continue
+        bounced = [y[1] for y, s in zip(plain.states, plain.exits, strict=True) if s == "stop"]
+        assert plain.end is SimulationEnd.CHATTER
+        # all impacts from its first on are slower than twice the one before, until they are too short
+        slow = bounced[max(rests - 1, 0) :]
+        assert all(b < 2.0 * a for a, b in pairwise(slow) if a > 1e-6)
+    assert min(counted) > 5

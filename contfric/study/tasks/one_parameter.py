@@ -198,9 +198,7 @@ def _sweep_of(found: Found, rows: list[str]) -> Sweep | None:
     swept: Sweep | None = found.get("sweep")
     if swept is None or swept.parameter != found["diagram"].parameter:
         return None
-    if not all(swept.shows(row) for row in rows):
-        return None
-    return swept if swept.section == "stops" or rows == ["stops"] else None
+    return swept if all(swept.shows(row) for row in rows) else None
 
 
 def _draw_equilibria(axes: list[Axes], rows: list[str], found: Found) -> None:

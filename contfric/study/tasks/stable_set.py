@@ -39,6 +39,9 @@ class StableSetTask(Response):
     max_points: int | None = Field(
         None, ge=2, description="a whole number >= 2: most points of each half"
     )
+    max_returns: int | None = Field(
+        None, ge=1, description="a whole number >= 1: most returns of the section map for each half"
+    )
 
     def check(self, asked: StudyCheck) -> None:
         """Check the model and the ranges."""
