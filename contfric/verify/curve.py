@@ -129,7 +129,7 @@ def check_admissible(scene: Scene, z: list[arb], met: Any = (), short: bool = Fa
         see(leads and not after * levels[i] > 0, f"{what} leads on in that direction")
         if direction and after and not levels[i]:  # a stick shows by itself that it may begin
             end, x = scene.joint(z, i + 1)
-            see(after * (scene.force(end) - x) - scene.s0, f"{what}: it reverses at its end")
+            see(after * (scene.force(end)[0] - x) - scene.s0, f"{what}: it reverses at its end")
         if direction:  # after rest with S0 = S it starts with acceleration 0
             rest = scene.segments[i - 1][0] == 0 and (scene.s0 - scene.s).is_zero()
             _inside((scene, z), i, "v", direction, 1 + rest, True, met)

@@ -61,7 +61,7 @@ class Scene:
     """The parameters and segments of a file, and their solution; joints are (phase of the excitation, x)."""
 
     def __init__(self, data: dict[str, Any], value: Any) -> None:
-        periods, self.half = data["periods"], data["half"]
+        periods, self.half, self.count = data["periods"], data["half"], len(data["segments"])
         possible = type(periods) is int and self.half in (False, periods % 2 == 1) and periods > 0
         see({*data["params"], data["parameter"]} == set(PARAMETERS) and possible, "it is periodic")
         p = {name: ball(given - 0) for name, given in data["params"].items()}  # and no text
@@ -70,23 +70,25 @@ class Scene:
         limits = (part(self.omega, 0) > 0, part(self.s, 0) >= 0, part(self.s0 - self.s, 0) >= 0)
         see(all(limits), "Omega > 0, S0 >= S >= 0", False)
         self.waves = [(1, arb(1), self.omega), (3, h, 3 * self.omega)][: 1 if h == 0 else 2]
+        self.rates = [(k, a, -a * w, -a * w * w, a * w**3) for k, a, w in self.waves]
         self.polynomial = [1 - w * w + 2 * J * self.zeta * w for _, _, w in self.waves]
         self.square = 1 - self.zeta * self.zeta
         self.root = (self.square if part(self.square, 0) > 0 else acb(1) * self.square).sqrt()
         self.turn, self.closing = periods * arb.pi() * (1 if self.half else 2), 1 - 2 * self.half
         self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]
-        self.count = len(self.segments)
 
-    def force(self, phase: Any, order: int = 0) -> Any:
-        """Return f or one of three derivatives of it by time."""
-        waves = [a * w**order * (k * phase).sin_cos()[order % 2 == 0] for k, a, w in self.waves]
-        return sum(waves[1:], waves[0]) * (-1 if order in (1, 2) else 1)
+    def force(self, phase: Any) -> list[Any]:
+        """Return f with three derivatives by time."""
+        turns = [(row, (row[0] * phase).sin_cos()) for row in self.rates]
+        waves = [(a * c, b * s, d * c, e * s) for (_, a, b, d, e), (s, c) in turns]
+        return [sum(others, first) for first, *others in zip(*waves, strict=True)]
 
-    def state(self, z: list[Any], i: int, tau: Any) -> tuple[Any, Any, Any, Any]:
-        """Return x with two derivatives some time after a segment begins, and C, C', D, D' of a slide."""
+    def state(self, z: list[Any], i: int, tau: Any) -> tuple[Any, Any, Any, Any, list[Any]]:
+        """Return x with two derivatives after some time in a segment, C, C', D, D' of a slide, and f."""
         (phase, x), (direction, _), root = self.joint(z, i), self.segments[i], self.root
+        force = self.force(phase + self.omega * tau)
         if not direction:
-            return x, 0 * x, 0 * x, ()
+            return x, 0 * x, 0 * x, (), force
         decay, q, offset = (-self.zeta * tau).exp(), self.square * tau * tau, -direction * self.s
         if abs(part(self.square, 0)) > NEAR:
             d, rate = decay * real((root * tau).sin() / root), decay * real((root * tau).cos())
@@ -103,18 +105,16 @@ class Scene:
                 near = tau * half.exp() * wave * entire(1.5, half * half / 4)
                 both = (near - d) / (J * (w + root) + self.zeta)
             y, v = y + real(turn * both), v + real(turn * (J * w * both + d))
-        force = self.force(phase + self.omega * tau)
-        return y, v, force - y - 2 * self.zeta * v + offset, (c, -d, d, rate)
+        return y, v, force[0] - y - 2 * self.zeta * v + offset, (c, -d, d, rate), force
 
     def observed(self, z: list[Any], i: int, name: str, tau: Any) -> tuple[Any, Any, Any, Any]:
         """Return v, or the load less its limit (F+, F-), with three derivatives."""
-        (y, v, a, slides), end = self.state(z, i, tau), self.joint(z, i)[0] + self.omega * tau
-        first, second = self.force(end, 1), self.force(end, 2)
+        y, v, a, slides, (force, first, second, third) = self.state(z, i, tau)
         jerk = first - v - 2 * self.zeta * a if slides else 0
         if name == "v":
             return v, a, jerk, second - a - 2 * self.zeta * jerk
-        load = y - self.force(end) + (-self.s0 if name == "F+" else self.s0)
-        return load, v - first, a - second, jerk - self.force(end, 3)
+        load = y - force + (-self.s0 if name == "F+" else self.s0)
+        return load, v - first, a - second, jerk - third
 
     def joint(self, z: list[Any], i: int) -> Any:
         """Return joint i, the last one by periodicity or symmetry."""
@@ -135,10 +135,11 @@ class Scene:
         (phase, x), (end, y), tau = self.joint(z, i), self.joint(z, i + 1), self.duration(z, i)
         direction, side = self.segments[i]
         if not direction:
-            load, slope = y - self.force(end), -self.force(end, 1) / self.omega
-            return [y - x, load - side * self.s0], ((0, -1), (0, 0)), ((0, 1), (slope, 1))
-        reached, v, last, (c, dc, d, dd) = self.state(z, i, tau)
-        first = (self.force(phase) - x - direction * self.s) / self.omega
+            f, rate, *_ = self.force(end)
+            load, slope = y - f - side * self.s0, -rate / self.omega
+            return [y - x, load], ((0, -1), (0, 0)), ((0, 1), (slope, 1))
+        reached, v, last, (c, dc, d, dd), _ = self.state(z, i, tau)
+        first = (self.force(phase)[0] - x - direction * self.s) / self.omega
         own = (-first * d, c), (-first * dd, dc)
         return [reached - y, v], own, ((v / self.omega, -1), (last / self.omega, 0))
 

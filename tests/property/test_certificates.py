@@ -216,6 +216,17 @@ def test_random_sums_of_harmonics_against_a_grid() -> None:
     assert decided > 50
 
 
+def test_fast_modes_are_halved_for_their_frequency_not_for_its_square() -> None:
+    """Displacements and velocities, x'' = -w^2 x: with equal weights |M| d is w^2 d, too many pieces."""
+    rng = np.random.default_rng(4)
+    for w in rng.uniform(100.0, 400.0, size=6).tolist():
+        field = arb_mat([[0, 1, 0], [-w * w, 0, 0], [0, 0, 0]])
+        path = Path(field, arb_mat([[1], [0], [1]]), arb(2.0))
+        assert path.norm < 1.5 * w
+        for offset in (1.01, 0.99):  # cos(w t) + offset
+            assert positive(path, arb_mat([[1, 0, offset]]), 0, False).proved is (offset > 1)
+
+
 # ---------------------------------------------------------------------------- small parts
 
 
