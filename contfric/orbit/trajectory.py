@@ -210,14 +210,16 @@ def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # t
 
 @helper
 def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether infinitely many impacts follow, with nothing else between, until the wall lets go.
+    """Tell whether infinitely many impacts follow, with nothing else between, until a surface is met at rest.
 
-    ``workspace.after`` is written over.
+    The wall lets go there, or a clock ticks, or the field changes. ``workspace.after`` is written over.
     """
-    on = tables.landed[chatter, surface]
+    on, after = tables.landed[chatter, surface], workspace.after
     longest = SLIDE_PERIODS * unit
-    _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    return met >= 0 and tables.bounds[chatter, met] == 1
+    tau, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
+    if met < 0:
+        return False
+    return not in_flight(functions, tables, chatter, surface, t + tau, after, p, workspace)
 
 
 @helper
