@@ -20,9 +20,9 @@ from contfric.chaos.endings import NO_MOTION, averaged, starts_at_rest, write_no
 from contfric.chaos.one_motion import carry_on, carry_through_reset, try_cycle, write_last
 from contfric.chaos.rows import CellRows, FollowingLimits, Starting
 from contfric.chaos.starting import start_mode
-from contfric.chaos.tangent import ARRIVED, seed
+from contfric.chaos.tangent import ARRIVED, any_time, seed
 from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
-from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix
+from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.compiling.references import by_reference, reference_at, store_at
 from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
@@ -131,7 +131,7 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
     on = surfaces_after(tables, mode, surface)
     mode, joint, cycle = following, solutions.joint[k] + 1, solutions.cycle[k] + turns
     key = mode * surfaces + surface
-    timeless = transit.at_once[1] & 1 != 0
+    timeless = any_time(transit)
     at = mode, on, key, t
     solutions.cycle[k] = cycle
     back = returned(workspaces.memory, key, cycle, joint, t, transit.y, period, timeless)
@@ -165,16 +165,21 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
 
 
 @helper
-def begun(functions, tables, starting, time, p, y, solutions, k, cell, limits, workspaces, rows):  # type: ignore[no-untyped-def]
-    """Put a cell into place k; or write what it is, if there is nothing to follow, and return False."""
+def begun(  # type: ignore[no-untyped-def]
+    functions, tables, starting, time, ticks, p, y, solutions, k, cell, limits, workspaces, rows
+):
+    """Put a cell into place k; or write what it is, if there is nothing to follow, and return False.
+
+    ``ticks`` is the time from tick to tick of a model with a clock, 0 of others.
+    """
     transit, state = workspaces.transit, workspaces.state
     rows.turns[cell], rows.followed[cell] = 0, 0
     period = functions.period(p, state.none, state.empty)
     timeless = period <= 0.0
-    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
+    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0) + (4 if ticks > 0.0 else 0)
     workspaces.cycle.transit.at_once[1] = transit.at_once[1]
     if timeless:
-        period = 1.0  # periods are units of time
+        period = ticks if ticks > 0.0 else 1.0  # periods of the clock, or units of time
     mode, on = start_mode(functions, tables, starting, time, y, p, state)
     if mode >= 0:
         start = mode, on, time - math.floor(time / period) * period, period
@@ -197,6 +202,7 @@ def follow_all(  # type: ignore[no-untyped-def]
     tables,
     starting,
     time,
+    ticks,
     vectors,
     states,
     limits,
@@ -223,6 +229,7 @@ def follow_all(  # type: ignore[no-untyped-def]
                     tables,
                     starting,
                     time,
+                    ticks[following],
                     vectors[following],
                     states[following],
                     solutions,
@@ -267,6 +274,7 @@ def follow_all(  # type: ignore[no-untyped-def]
         TablesType,
         StartingType,
         f8,
+        vector,
         matrix,
         matrix,
         LimitsType,
@@ -275,7 +283,7 @@ def follow_all(  # type: ignore[no-untyped-def]
     )
 )
 def follow_cells(  # type: ignore[no-untyped-def]
-    functions, flow, tables, starting, time, vectors, states, limits, stop, rows
+    functions, flow, tables, starting, time, ticks, vectors, states, limits, stop, rows
 ):
     """Follow solutions from ``states`` at ``time``, and fill the rows.
 
@@ -285,6 +293,7 @@ def follow_cells(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     flow : first hits of many solutions at once
+    ticks : time from tick to tick of a clock, 0 of a model without, shape (cells,)
     vectors, states : parameters and initial states, shapes (cells, parameters) and (cells, n)
     stop : another thread writes a 1 to it when nobody waits for the rows any more
     """
@@ -298,6 +307,7 @@ def follow_cells(  # type: ignore[no-untyped-def]
         tables,
         starting,
         time,
+        ticks,
         vectors,
         states,
         limits,

@@ -24,6 +24,7 @@ from contfric.errors import ParameterError, function_of, mapping_of, shown, whol
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.time_scale import has_clock
 
 #: Bytes of a solution in a map beyond its exponents and its initial state.
 _BYTES = 24
@@ -56,7 +57,7 @@ def lyapunov_map(
     ----------
     model, params : the model (or its name) and the parameters that do not vary; defaults fill in
     axes : mapping of two parameters to their values, each ascending
-    periods : most periods of the excitation to average over
+    periods : most periods (of the excitation or of a clock; else units of time) to average over
     transient : periods before averaging begins
     tolerance : relative error of the largest exponent at which averaging ends
     confirm : periods to follow a motion further, after averaging, to see whether it converges after all
@@ -232,7 +233,7 @@ def _all_states(
 ) -> FloatArray:
     """Return the initial states at each point, shape (len, len, starts, n)."""
     shape = (*(len(values) for values in grid.values()), count, len(model.states))
-    if not callable(state):
+    if not callable(state) and not has_clock(model):
         return np.broadcast_to(given_states(model, state, {}), shape)
     base = model.mapping(vector)
     states = np.empty(shape)

@@ -34,8 +34,8 @@ class LyapunovExponents(Shown):
     motion : Motion
         What the solution turned out to be, and what the exponents mean.
     periods : int
-        Period of a periodic solution, in periods of the excitation; 0 for others. Without excitation 1,
-        and all other periods here are units of time.
+        Period of a periodic solution, in periods of the excitation or of the clock; 0 for others. Without
+        either 1, and all other periods here are units of time.
     followed : int
         Periods that the solution was followed.
     tolerance : float
@@ -177,7 +177,7 @@ def lyapunov_exponent(
     model, params : the model (or its name) and its parameters; defaults fill in
     state : initial state, shape (n,), or a function of the parameters; by default displaced from rest
     time : initial time, nondimensional
-    periods : most periods of the excitation to average over
+    periods : most periods (of the excitation or of a clock; else units of time) to average over
     transient : periods before averaging begins
     tolerance : relative error of the largest exponent at which averaging ends
     confirm : periods to follow a motion further, after averaging, to see whether it converges after all

@@ -89,7 +89,7 @@ class LyapunovMap(Tabled):
 
     @property
     def periods(self) -> NDArray[np.int32]:
-        """Periods of periodic solutions, in periods of the excitation, 0 for others."""
+        """Periods of periodic solutions, in periods of the excitation or of a clock, 0 for others."""
         return self.rows.periods
 
     @property

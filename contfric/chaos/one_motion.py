@@ -15,7 +15,15 @@ from contfric.chaos.endings import (
     write_equilibrium,
     write_quiet,
 )
-from contfric.chaos.tangent import ARRIVED, behind, differentiate, orthonormalise, push, to_joint
+from contfric.chaos.tangent import (
+    ARRIVED,
+    any_time,
+    behind,
+    differentiate,
+    orthonormalise,
+    push,
+    to_joint,
+)
 from contfric.compiled import helper
 from contfric.orbit.trajectory import QUIET
 
@@ -54,7 +62,7 @@ def try_cycle(  # type: ignore[no-untyped-def]
         rows.exponents[cell, k] = cycle.rates[k]
         rows.errors[cell, k] = error
     rows.turns[cell] = 1  # without excitation: a cycle
-    if transit.at_once[1] & 1 == 0:
+    if not any_time(transit):
         rows.turns[cell] = shortest(
             functions, tables, ranks, mode, on, key, joints, turns, p, period, cycle, state
         )

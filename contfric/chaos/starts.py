@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.starts import displaced
+from contfric.orbit.starts import displaced, with_clocks
+from contfric.orbit.time_scale import has_clock
 
 #: A state, shape (n,), several, shape (k, n), or a function of the parameters that returns either.
 StateLike: TypeAlias = ArrayLike | Callable[[Mapping[str, float]], ArrayLike]
@@ -84,6 +85,9 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
     except (TypeError, ValueError, OverflowError):
         states = np.empty((0, 0))
     n = len(model.states)
+    if states.ndim == 2 and states.shape[1] < n and has_clock(model):
+        vector = model.vector(params)
+        states = np.array([with_clocks(model, vector, row) for row in states])
     if states.ndim != 2 or states.shape[1] != n or not len(states) or not np.isfinite(states).all():
         raise ParameterError(
             f"a state of '{model.name}' is {n} finite numbers ({', '.join(model.states)}), several "

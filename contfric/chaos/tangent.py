@@ -76,8 +76,9 @@ class Transit(NamedTuple):
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : workspace for a state and for the image of a perturbation, shape (n,)
     at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
-        plus 2 if it has resets; whether there was an impact among those events; 1 + the wall that was met
-        last if impacts go on alike since, and how many to come are known not to lead to rest; shape (5,)
+        plus 2 if it has resets, plus 4 if it has a clock; whether there was an impact among those events;
+        1 + the wall that was met last if impacts go on alike since, and how many to come are known not to
+        lead to rest; shape (5,)
     ahead, meets : duration of the next segment and the surface that ends it, where they are known beforehand,
         with the state there and the derivatives; else SINGLY as the surface; shapes (1,)
     """
@@ -91,6 +92,12 @@ class Transit(NamedTuple):
     at_once: IntArray
     ahead: FloatArray
     meets: IntArray
+
+
+@helper
+def any_time(transit):  # type: ignore[no-untyped-def]
+    """Return whether any time may pass until a motion returns: it has neither excitation nor a clock."""
+    return transit.at_once[1] & 5 == 1
 
 
 @allocating_helper

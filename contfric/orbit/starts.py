@@ -173,7 +173,7 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
         y = np.array(state, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         y = np.empty(0)
-    y = _with_clocks(model, vector, y)
+    y = with_clocks(model, vector, y)
     if y.shape != (len(model.states),) or not np.all(np.isfinite(y)):
         raise ParameterError(
             f"a state of '{model.name}' is {len(model.states)} finite numbers "
@@ -182,7 +182,7 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
     return y
 
 
-def _with_clocks(model: Model, vector: FloatArray, y: FloatArray) -> FloatArray:
+def with_clocks(model: Model, vector: FloatArray, y: FloatArray) -> FloatArray:
     """Return a state without its clocks, as a file declares it, with them: just after a tick."""
     clocks = [is_clock(name) for name in model.states]
     if not any(clocks) or y.shape != (clocks.count(False),):

@@ -13,6 +13,7 @@ from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
+from contfric.orbit.time_scale import clock_period
 from contfric.response.targets import Targets
 
 #: Periods before the growth of a separation is averaged, and its relative error, for what no orbit has
@@ -98,7 +99,8 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
     open_ = np.flatnonzero(free & ~np.isin(ends, list(known)))
     if len(open_) and (stop is None or stop[0] == 0):
         vectors = np.tile(task.vector, (len(open_), 1))
-        limits = FollowingLimits(_TRANSIENT, max(1, task.periods), _TOLERANCE)
+        periods = round(task.periods / clock_period(task.model, task.vector))
+        limits = FollowingLimits(_TRANSIENT, max(1, periods), _TOLERANCE)
         cells = follow(task.model, vectors, task.states[open_], task.time, limits, stop)
         motions[open_] = cells.motions
     return BasinRows(labels.astype(np.int32), motions)

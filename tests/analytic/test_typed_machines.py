@@ -296,6 +296,16 @@ def test_periods_are_those_of_the_clock(tmp_path, Ts: float) -> None:
     assert len(cf.poincare(model, {"Ts": Ts}, [0.1], **how).times) == 8
     swept = cf.sweep(model, "Ts", [Ts, 2 * Ts], both=False, **how).up  # the longest of both periods
     assert max(np.bincount(swept.index)) <= 16
+    exponent = cf.lyapunov_exponent(model, {"Ts": Ts}, state=[0.1], transient=20)
+    orbit = cf.find_orbit(model, {"Ts": Ts}, state=[0.1])
+    assert exponent.periods == round(orbit.period / Ts)
+    axes = {"Ts": [0.5 * Ts, Ts], "g": [0.3, 0.4]}
+    found = cf.lyapunov_map(model, axes, {"peak": 0.7}, state=[0.1], transient=20)
+    assert found.periods[1, 1, 0] == exponent.periods
+    assert exponent.followed < 40  # units of time were periods: of 0.01 a hundred ticks
+    assert exponent.largest == pytest.approx(
+        np.log(max(map(abs, orbit.multipliers))) / orbit.period, rel=1e-9
+    )
 
 
 #: One phase of a switched reluctance motor: current in a band between two angles, then driven down to zero.
