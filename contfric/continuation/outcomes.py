@@ -287,8 +287,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
         return _never_left(orbit, h, after_rest)
     if location.margin is Margin.INTERIOR:
         return _pin_moves(orbit, location, after_rest)
-    lasts = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
-    gone = lasts < NEARLY_NO_LENGTH * time_unit(orbit)
+    gone = orbit.ends[behind, 0] - orbit.cycle[behind, 0] < NEARLY_NO_LENGTH * time_unit(orbit)
     # a second hold, and the slide between them
     if gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
         return _never_left(orbit, h, after_rest)
@@ -332,9 +331,8 @@ def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Outco
             raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
         edit = Edit(renamed={(h - 1) % len(orbit.itinerary): location.surface, h: TOUCH})
         return Outcome(edit, {(h, -1): touch}, reason)
-    return Outcome(
-        split(h, location.surface, (orbit.itinerary[h][0], TOUCH)), {(h, 0): touch}, reason
-    )
+    edit = split(h, location.surface, (orbit.itinerary[h][0], TOUCH))
+    return Outcome(edit, {(h, 0): touch}, reason)
 
 
 def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
@@ -359,9 +357,7 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
     behind = (i + 1) % len(itinerary)
     whole = orbit.model.whole_mode
     if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
-        raise NotationError(
-            f"the impact after segment {i + 1} changes the mode: it cannot be left out"
-        )
+        raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
     reason = f"no impact on {location.surface} after segment {i + 1}"
     return Outcome(*slides.runs_on(orbit, i, behind), reason)
 
