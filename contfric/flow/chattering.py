@@ -141,8 +141,7 @@ def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-
             return at
     if dt_max <= rests:
         return -1.0
-    begins = on and rests <= 0.0  # at rest already: contact that goes on behind a surface
-    at = motion.hit(mode, c, target, begins, limit[0], limit[1:], dt_max - rests, p, y1)
+    at = motion.hit(mode, c, target, False, limit[0], limit[1:], dt_max - rests, p, y1)
     return rests + at if at >= 0.0 else -1.0
 
 

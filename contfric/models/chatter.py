@@ -63,57 +63,33 @@ def chatter_parts(
     found: dict[str, Any] = {
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
-    chatters: dict[str, Any] = {}
+    chatters = {}
     for surface in surfaces:
         name = CHATTER if len(surfaces) == 1 else f"{CHATTER}_{surface}"
-        several = _flights(description, surface)
-        if len(several) == 1:
-            chatters[surface] = _added(found, formulas, surface, several[0], (name, surface))
-            continue
-        names = [(f"{name}_{own[0].name}", f"{surface}_{own[0].name}") for own in several]
-        chatters[surface] = [
-            _added(found, formulas, surface, flights, own)
-            for flights, own in zip(several, names, strict=True)
-        ]
+        ways = [_Wall(formulas, surface, flight) for flight in _flights(description, surface)]
+        lifts = [f"{surface}_lift", f"{surface}_lift_below"][: len(ways)]
+        named = [("modes", name), *((k, n) for n in lifts for k in ("surfaces", "observables"))]
+        for kind, taken in named:
+            if taken in found[kind]:
+                raise EntryError(
+                    (kind, taken), f"'{taken}' is a name of the chatter at '{surface}'"
+                )
+        sides: dict[str, int | str] = {}
+        for lift, way in zip(lifts, ways, strict=True):
+            found["observables"][lift] = way.text(way.lift)
+            found["surfaces"][lift] = {"observable": lift, "level": "0"}
+            sides |= {s: side for s, side in way.flight.sides.items() if s != description.phase}
+            sides[lift] = "-" if way.side > 0 else "+"
+        ways[0].check_same(ways[-1])
+        found["modes"][name] = {
+            "in": {**sides, surface: 0},
+            "field": dict(zip(description.states, map(ways[0].text, ways[0].field), strict=True)),
+            "rank": len(description.states) - 2,
+        }
+        chatters[surface] = {"mode": name, "flight": ways[0].flight.name, "lift": lifts[0]}
+        if len(ways) > 1:
+            chatters[surface] |= {"other": ways[1].flight.name, "other_lift": lifts[1]}
     return {**found, "chatters": chatters}
-
-
-def _added(
-    found: dict[str, Any],
-    formulas: Formulas,
-    surface: str,
-    flights: list[ModeText],
-    names: tuple[str, str],
-) -> dict[str, str]:
-    """Add the mode of chatter of some flights (one, or one on each side) to a model, and say what it is.
-
-    Parameters
-    ----------
-    names : of the mode, and what the names of the surfaces that end it begin with
-    """
-    description, name = formulas.description, names[0]
-    ways = [_Wall(formulas, surface, flight) for flight in flights]
-    lifts = [f"{names[1]}_lift", f"{names[1]}_lift_below"][: len(ways)]
-    named = [("modes", name), *((k, n) for n in lifts for k in ("surfaces", "observables"))]
-    for kind, taken in named:
-        if taken in found[kind]:
-            raise EntryError((kind, taken), f"'{taken}' is a name of the chatter at '{surface}'")
-    sides: dict[str, int | str] = {}
-    for lift, way in zip(lifts, ways, strict=True):
-        found["observables"][lift] = way.text(way.lift)
-        found["surfaces"][lift] = {"observable": lift, "level": "0"}
-        sides |= {s: side for s, side in way.flight.sides.items() if s != description.phase}
-        sides[lift] = "-" if way.side > 0 else "+"
-    ways[0].check_same(ways[-1])
-    found["modes"][name] = {
-        "in": {**sides, surface: 0},
-        "field": dict(zip(description.states, map(ways[0].text, ways[0].field), strict=True)),
-        "rank": len(description.states) - 2,
-    }
-    own = {"mode": name, "flight": ways[0].flight.name, "lift": lifts[0]}
-    if len(ways) > 1:
-        own |= {"other": ways[1].flight.name, "other_lift": lifts[1]}
-    return own
 
 
 def with_chatter(model: Model) -> Model | None:
@@ -140,36 +116,27 @@ def _with_chatter_at(definition: str, walls: tuple[str, ...]) -> Model | None:
     return model_from(found) if found.chatters else None
 
 
-def _flights(description: Description, surface: str) -> list[list[ModeText]]:
-    """Return the modes that the impacts of each chatter at a wall are in.
-
-    They are one on a side, or one on each side, which are one chatter. Several on one side have a chatter
-    each: a motion that leaves its mode between impacts (a coil is switched off) may come to rest in the
-    next one. Motion on another surface (a mass that sticks) has none there: impacts throw it off.
-    """
+def _flights(description: Description, surface: str) -> list[ModeText]:
+    """Return the modes that the impacts at a wall are in, at most one above and one below."""
     named = description.acts.get(surface, ())
     found = [
         mode
         for mode in description.modes
-        if mode.sides.get(surface, 0) != 0
-        and 0 not in mode.sides.values()
-        and (not named or mode.name in named)
+        if mode.sides.get(surface, 0) != 0 and (not named or mode.name in named)
     ]
     first = joined_modes(description)
     wholes = {
         side: {first[mode.name] for mode in found if mode.sides[surface] == side}
         for side in (1, -1)
     }
-    names = [name for own in wholes.values() for name in own]
-    by_name = {mode.name: mode for mode in description.modes}
-    if names and all(len(own) <= 1 for own in wholes.values()):
-        return [[by_name[name] for name in names]]
-    if names and not all(wholes.values()):
-        return [[mode] for mode in description.modes if mode.name in names]
+    slides = any(0 in mode.sides.values() for mode in found)
+    if found and not slides and all(len(names) <= 1 for names in wholes.values()):
+        names = [name for own in wholes.values() for name in own]
+        return [mode for name in names for mode in description.modes if mode.name == name]
     raise EntryError(
         ("resets", surface, CHATTER),
-        f"chatter at '{surface}' is derived where its impacts are in modes on one side of it, or in one on "
-        f"each side, which do not slide, and they are in {', '.join(m.name for m in found) or 'none'}",
+        f"chatter at '{surface}' is derived where its impacts are in one mode on a side of it, which does "
+        f"not slide, and they are in {', '.join(mode.name for mode in found) or 'none'}",
     )
 
 

@@ -303,12 +303,9 @@ def symmetry_of(sampler: Sampler, surfaces: list[Surface]) -> Symmetry | None:
         images = {name: image for name, (image, _) in found.items()}
         kept = frozenset(name for name, (_, sense) in found.items() if sense > 0)
         modes = _modes_alike(sampler, matrix, points, moved)
-        plain = [own for own in description.chatters if not own.other]
-        for own in plain:  # of two walls they may be levels of one observable
-            alike = modes.get(own.flight, frozenset())
-            ends = [c for c in plain if c.surface == images[own.surface]]
-            ends = [c for c in ends if c.flight in alike] or ends
-            images[own.lift] = next((c.lift for c in ends), images[own.lift])
+        lifts = {own.surface: own.lift for own in description.chatters if not own.other}
+        for wall, lift in lifts.items():  # of two walls they may be levels of one observable
+            images[lift] = lifts.get(images[wall], images[lift])
     except ModelError as error:
         raise EntryError(("symmetry",), str(error)) from None
     if not description.period:

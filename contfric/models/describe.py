@@ -109,9 +109,7 @@ def _described(data: dict[str, Any]) -> Description:
         departures=_departures(top, surfaces),
         **_resets(top, states, surfaces, modes),
         chatters=tuple(
-            Chatter(surface, **own)
-            for surface, several in mapping_in(data, "chatters").items()
-            for own in (several if isinstance(several, list) else [several])
+            Chatter(surface, **own) for surface, own in mapping_in(data, "chatters").items()
         ),
         symmetry=_symmetry(top, states),
         stop_surface=_stop_surface(top, surfaces),

@@ -133,7 +133,10 @@ class Description:
         }
         found.update({"period": self.period} if self.period else {"autonomous": True})
         if self.chatters:
-            found["chatters"] = _by_wall(self.chatters)
+            found["chatters"] = {
+                c.surface: {k: v for k, v in asdict(c).items() if v and k != "surface"}
+                for c in self.chatters
+            }
         if self.symmetry is not None:
             found["symmetry"] = dict(self.symmetry)
         if self.max_step is not None:
@@ -187,15 +190,6 @@ class Description:
             dict(self.define),
             {o.name: o.formula for o in self.observables},
         )
-
-
-def _by_wall(chatters: Sequence[Chatter]) -> dict[str, Any]:
-    """Return what a file says of the chatter at each wall: a list, where it happens in several modes."""
-    found: dict[str, Any] = {}
-    for own in chatters:
-        entry = {k: v for k, v in asdict(own).items() if v and k != "surface"}
-        found.setdefault(own.surface, []).append(entry)
-    return {wall: own if len(own) > 1 else own[0] for wall, own in found.items()}
 
 
 def _leads_entry(leads: Sequence[Lead]) -> Any:

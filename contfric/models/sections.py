@@ -70,14 +70,11 @@ def _joined(key: _Key) -> dict[str, str]:
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     acts = description.acts.items()
     mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
-    # two contacts may have one field, and begin with the impacts of other flights
-    resting = {own.mode for own in description.chatters}
     fields, going_on = _SampledFields(description), True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
             alike = lies_on[a.name] == lies_on[b.name] and mapped[a.name] == mapped[b.name]
-            alike = alike and not {a.name, b.name} & resting
             if first[a.name] == first[b.name] or not alike:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}

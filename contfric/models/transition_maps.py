@@ -11,11 +11,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.contact_maps import ContactMaps
 from contfric.models.parts import across, led
+from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
     from contfric.models.parts import (
+        Chatter,
         Departure,
         Domain,
         FloatArray,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     )
 
 
-class TransitionMaps(ContactMaps):
+class TransitionMaps(SectionMaps):
     """The part of a model that derives its transitions from its domains, departures and resets."""
 
     if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class TransitionMaps(ContactMaps):
         symmetry: Symmetry | None
         kinks: tuple[str, ...]
         turned: frozenset[tuple[str, str]]
+        chatters: tuple[Chatter, ...]
 
     @property
     def composed(self) -> bool:
@@ -80,9 +82,9 @@ class TransitionMaps(ContactMaps):
         for own in self.chatters:
             for domain in self.domains_of(own.mode):
                 found[domain.name] = [
-                    (surface, target)
-                    for surface in (*(lift for lift, _ in own.ways), *self.contact_exits(domain))
-                    for target in self.targets[domain.name, surface]
+                    (lift, target)
+                    for lift, _ in own.ways
+                    for target in self.targets[domain.name, lift]
                 ]
         return found
 
@@ -150,8 +152,6 @@ class TransitionMaps(ContactMaps):
             for domain in self.domains_of(own.mode):
                 for lift, flight in own.ways:
                     found[domain.name, lift] = tuple(d.name for d in self.domains_of(flight))
-                for surface, resting in self.contact_exits(domain).items():
-                    found[domain.name, surface] = (*resting, *self.let_go(resting))
         return found
 
     def undecided(self) -> Iterator[tuple[Domain, str, tuple[str, ...]]]:
@@ -263,6 +263,25 @@ class TransitionMaps(ContactMaps):
             and all(d.signs[s] == side or (s in slid and d.signs[s]) for s, side in asked.items())
         ]
 
+    @cached_property
+    def chatter_at(self) -> dict[tuple[str, str], Chatter]:
+        """Chatter that impacts in a mode, at a surface, may lead to."""
+        return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
+
+    @cached_property
+    def settled_sides(self) -> dict[str, int]:
+        """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
+        return {
+            lift: self.domains_of(own.mode)[0].signs[lift]
+            for own in self.chatters
+            for lift, _ in own.ways
+        }
+
+    @cached_property
+    def chatter_by_mode(self) -> dict[str, Chatter]:
+        """Chatter by its modes."""
+        return {own.mode: own for own in self.chatters}
+
     def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""
         if reset.surface not in self._landed_on:
@@ -289,8 +308,6 @@ class TransitionMaps(ContactMaps):
         through = {**domain.signs, surface.name: -sign}
         resting_at = self.chatter_by_mode.get(mode)
         flight = dict(resting_at.ways).get(surface.name) if resting_at is not None else None
-        if surface.name in self.settled_sides and flight is None:
-            return None  # it ends the contact of another mode
         if resting_at is not None and flight is not None:  # the wall lets go
             side = self._side_of[flight, resting_at.surface]
             return self._domain_with({**domain.signs, resting_at.surface: side}, flight)

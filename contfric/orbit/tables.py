@@ -16,7 +16,7 @@ import numpy as np
 
 from contfric.errors import ModelError, ParameterError
 from contfric.models.composed import ComposedModel
-from contfric.models.definition import Domain, Mode, Model, Surface
+from contfric.models.definition import Mode, Model, Surface
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 
@@ -177,39 +177,12 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
             for after in model.targets[domain.name, lift]:
                 signs = model.domain_by_name[after].signs
                 add(domain.name, lift, signs, {own.surface}, after)
-        for domain in model.domains_of(own.mode):
-            for surface, resting in model.contact_exits(domain).items():
-                pair = model.mode_index[own.mode], model.surface_index[surface]
-                found[pair] = _pressed_or_not(model, domain, surface, resting)
     first, rules = [0], []
     for mode in range(len(model.modes)):
         for k in range(len(model.surfaces)):
             rules += _merged(found.get((mode, k), {}))
             first.append(len(rules))
     return np.array(first, dtype=np.int64), np.array(rules, dtype=np.int64).reshape(-1, 3)
-
-
-def _pressed_or_not(
-    model: Model, domain: Domain, surface: str, resting: Sequence[str]
-) -> dict[tuple[int, int], int]:
-    """Return the rules where contact meets a surface: contact, if the wall is pressed there, or flight."""
-    found: dict[tuple[int, int], int] = {}
-    landed = _landed(model, domain.own_mode, surface)
-    for name in resting:
-        target = model.domain_by_name[name]
-        own = model.chatter_by_mode[target.own_mode]
-        lifts = [lift for lift, _ in own.ways]
-        mask, value = sides_of(model, target.signs, landed)
-        bits = bits_of(model, lifts)
-        pressed = bits_of(model, (lift for lift in lifts if target.signs[lift] > 0))
-        found[mask | bits, value | pressed] = model.mode_index[target.own_mode]
-        for lift, flight in own.ways:
-            bit = bits_of(model, [lift])
-            free = 0 if target.signs[lift] > 0 else bit
-            for after in model.domains_of(flight):
-                mask, value = sides_of(model, after.signs, {*landed, own.surface})
-                found[mask | bit, value | free] = model.mode_index[after.own_mode]
-    return found
 
 
 def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:

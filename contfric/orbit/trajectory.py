@@ -214,20 +214,18 @@ def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # t
 
 @helper
 def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Return 0 if infinitely many impacts follow, with nothing else between, until a surface is met at rest.
+    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall lets go.
 
-    The wall lets go there, or a clock ticks, or the field changes. Otherwise return after how many impacts,
-    counted from this one, that is to be asked again. ``workspace.after`` is written over.
+    Otherwise after how many impacts, counted from this one, that is to be asked again.
+    ``workspace.after`` is written over.
     """
     count, slow = impacts_ahead(functions, tables, chatter, surface, t, y, p, unit, workspace)
     if not slow:
         return count
-    on, after = tables.landed[chatter, surface], workspace.after
+    on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
-    tau, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    if met < 0 or in_flight(functions, tables, chatter, surface, t + tau, after, p, workspace):
-        return count
-    return 0
+    _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
+    return 0 if met >= 0 and tables.bounds[chatter, met] == 1 else count
 
 
 @helper

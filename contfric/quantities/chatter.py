@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from contfric.models.parts import Chatter
     from contfric.quantities.motion import MeasuredSegment
 
-#: A speed below this is rest, as it is to the flow (:mod:`contfric.flow.chatter`).
-_REST = 1e-14
 #: Flights of lower speeds, as a share of the first, are left out: they change integrals by 1e-15.
 _SLOWEST = 1e-5
 #: Periods (or units of time) that a flight is looked for in.
@@ -42,7 +40,7 @@ def pieces(segment: MeasuredSegment, own: Chatter) -> Iterator[MeasuredSegment]:
         flight = own.flight if not own.other or speed * side > 0.0 else own.other
         speed = abs(speed)
         first = max(first, speed)
-        if speed <= max(_SLOWEST * first, _REST):  # or at rest already, as contact goes on
+        if speed <= _SLOWEST * first:
             break
         hit = view.first(flight, gap, level, part.start, part.state, longest, on=True)
         if hit is None:
