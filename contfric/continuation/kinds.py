@@ -39,7 +39,7 @@ from contfric.continuation.touching import (
     resting_domain,
     touched_at_joint,
 )
-from contfric.models.definition import Domain, FloatArray
+from contfric.models.definition import Domain, FloatArray, Model
 from contfric.orbit.holds import Hold
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, System, inside_sign
@@ -71,13 +71,19 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
         resting = resting_domain(system, test)
         if resting is None and inside_sign(model, mode, test.surface) == 0:
             return Kind.T
-    joint = test.margin is Margin.JOINT
-    touched = touched_at_joint(system, test, orbit) if joint else test.surface
+    if test.margin is not Margin.JOINT:
+        return _kind_of_touch(model, mode, test.surface)
+    resting = rest_at(test, orbit)
+    touched = touched_at_joint(test, orbit, resting)
     if touched is not None:
-        if ends_rest(model, mode, touched):
-            return Kind.AS
-        return Kind.T if inside_sign(model, mode, touched) == 0 else Kind.GS
-    return Kind.CS if _leaves(test, orbit) else Kind.SS
+        return _kind_of_touch(model, mode, touched)
+    return Kind.CS if resting is None or _leaves(resting, test, orbit) else Kind.SS
+
+
+def _kind_of_touch(model: Model, mode: str, surface: str) -> Kind:
+    if ends_rest(model, mode, surface):
+        return Kind.AS
+    return Kind.T if inside_sign(model, mode, surface) == 0 else Kind.GS
 
 
 def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
@@ -115,15 +121,12 @@ def outward_rate(resting: Domain, test: EventFunction, orbit: Orbit) -> float:
     return -resting.signs[test.surface] * rate_along(orbit, resting.mode, test.surface, end)
 
 
-def _leaves(test: EventFunction, orbit: Orbit) -> bool:
+def _leaves(resting: Domain, test: EventFunction, orbit: Orbit) -> bool:
     """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
 
     A load that stands still at the stop grows after it where it has its minimum: a stick around the minimum
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
     """
-    resting = rest_at(test, orbit)
-    if resting is None:  # it is left
-        return True
     rate = outward_rate(resting, test, orbit)
     if abs(rate) >= ROUNDED:
         return rate > 0.0

@@ -25,21 +25,25 @@ _OUTSIDE = 1e-6
 _STATES = 6
 
 
-def touched_at_joint(system: System, test: EventFunction, orbit: Orbit) -> str | None:
+def touched_at_joint(test: EventFunction, orbit: Orbit, resting: Domain | None) -> str | None:
     """Return the surface that is touched where two are met at a joint; None if that is a corner of them.
 
     A slider that begins to slip reaches its limit where its velocity vanishes, and that may be the section:
     nothing stops there, and the touch is that inside of the segment, whose margin vanishes too. So it is
     where one of the two is the zero of the other one's rate, and nothing rests there: they are met at once
     by a tangency alone, and which of them ends the segment is a matter of the itinerary.
+
+    Parameters
+    ----------
+    resting : what :func:`rest_at` says of the joint
     """
-    model, (mode, exit_) = system.model, system.itinerary[test.segment]
+    model, (mode, exit_) = orbit.model, orbit.system.itinerary[test.segment]
     end = orbit.ends[test.segment]
     if is_section(model, mode, exit_):
         return (
             test.surface if abs(rate_along(orbit, mode, test.surface, end)) < _TANGENTIAL else None
         )
-    if exit_ not in model.surface_by_name or rest_at(test, orbit) is not None:
+    if exit_ not in model.surface_by_name or resting is not None:
         return None
     for touched, other in ((test.surface, exit_), (exit_, test.surface)):
         slow = abs(rate_along(orbit, mode, touched, end)) < _PASSED
