@@ -39,9 +39,10 @@ def fault_of_itinerary(orbit: Orbit) -> str | None:
 
 def fault_of(branch: Branch, width: float) -> str | None:
     """Return what is wrong with a branch; None if nothing is. ``width`` is that of the parameter's range."""
-    if _undetermined(branch, width):
+    found = next((why for is_so, why in _FAULTS if is_so(branch)), None)
+    if found is None and _undetermined(branch, width):
         return "rounding leaves no place of its end in the range: its equations are singular there"
-    return next((why for is_so, why in _FAULTS if is_so(branch)), None)
+    return found
 
 
 def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:

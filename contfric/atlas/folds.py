@@ -65,17 +65,17 @@ def follow_arms(state: Exploration, event: Event) -> bool:
     longest = lengths(unit.periods, unit.half, most)
     if arms.letters == 2 and longest == [1]:
         return True  # the two arms of the branch itself
-    beside = [(d, found) for d in NEARER if (found := arms.beside(d, state.settings)) is not None]
+    near = [(d, found) for d in NEARER if (found := arms.beside(d, state.settings)) is not None]
     for length in longest:
         many = count(arms.letters, length)
-        if many > MOST_SEQUENCES or not beside:
+        if many > MOST_SEQUENCES or not near:
             why = f"{many} sequences: more than {MOST_SEQUENCES} are not tried"
-            why = why if beside else "the arms were not found next to the fold"
+            why = why if near else "the arms were not found next to the fold"
             state.judge(event, f"orbits of {length} units", Verdict.REFUSED, why=why)
             continue
         for sequence in necklaces(arms.letters, length):
             exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
-            _try_arms(state, event, beside, sequence, exchanged)
+            _try_arms(state, event, near, sequence, exchanged)
     return True
 
 
@@ -87,7 +87,7 @@ def _rotated(sequence: tuple[int, ...]) -> tuple[int, ...]:
 def _try_arms(
     state: Exploration,
     event: Event,
-    beside: list[tuple[float, Arms]],
+    near: list[tuple[float, Arms]],
     sequence: tuple[int, ...],
     exchanged: tuple[int, ...],
 ) -> None:
@@ -96,8 +96,8 @@ def _try_arms(
     It is traced to one side of the fold where that is the same, or its image, or is known already: a branch
     may end at the fold, or pass it, as its vertex is seen or not.
     """
-    reason = _reason(beside[0][1], sequence)
-    for _, arms in beside:
+    reason = _reason(near[0][1], sequence)
+    for _, arms in near:
         there = arms.orbit(sequence)
         if not (there.converged and there.admissible):
             continue

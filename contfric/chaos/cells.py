@@ -20,7 +20,7 @@ from contfric.chaos.endings import NO_MOTION, averaged, starts_at_rest, write_no
 from contfric.chaos.one_motion import carry_on, carry_through_reset, try_cycle, write_last
 from contfric.chaos.rows import CellRows, FollowingLimits, Starting
 from contfric.chaos.starting import start_mode
-from contfric.chaos.tangent import ARRIVED, any_time, seed
+from contfric.chaos.tangent import ARRIVED, MODEL, any_time, forget_events, seed, set_model
 from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
 from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.compiling.references import by_reference, reference_at, store_at
@@ -100,8 +100,7 @@ def begin(solutions, k, cell, start, y, p, limits, workspaces):  # type: ignore[
         workspaces.transit.y[j] = y[j]
     for j in range(p.shape[0]):
         solutions.p[k, j] = p[j]
-    for j in (0, 2, 3):
-        workspaces.transit.at_once[j] = 0
+    forget_events(workspaces.transit)
     seed(workspaces.frame, 0)
     forget(workspaces.memory)
     clear(workspaces.averages)
@@ -114,7 +113,7 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
     surfaces, p, cell = tables.observables.shape[0], solutions.p[k], solutions.cell[k]
     mode, on, t, period = solutions.mode[k], solutions.on[k], solutions.time[k], solutions.period[k]
     live = solutions.live[k]
-    if transit.at_once[1] == 0:
+    if transit.events[MODEL] == 0:
         outcome, surface, following, duration, turns, t, live = carry_on(
             functions, tables, ranks, mode, on, t, p, period, live, workspaces
         )
@@ -176,8 +175,8 @@ def begun(  # type: ignore[no-untyped-def]
     rows.turns[cell], rows.followed[cell] = 0, 0
     period = functions.period(p, state.none, state.empty)
     timeless = period <= 0.0
-    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0) + (4 if ticks > 0.0 else 0)
-    workspaces.cycle.transit.at_once[1] = transit.at_once[1]
+    set_model(transit, tables, timeless, ticks)
+    set_model(workspaces.cycle.transit, tables, timeless, ticks)
     if timeless:
         period = ticks if ticks > 0.0 else 1.0  # periods of the clock, or units of time
     mode, on = start_mode(functions, tables, starting, time, y, p, state)

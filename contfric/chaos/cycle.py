@@ -26,6 +26,8 @@ from contfric.chaos.tangent import (
     Transit,
     behind,
     differentiate,
+    forget_events,
+    is_autonomous,
     new_transit,
     orthonormalise,
     push,
@@ -206,12 +208,12 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
     """
     transit, z, images, frame = cycle.transit, cycle.z, cycle.images, cycle.frame
     n = transit.y.shape[0]
-    transit.at_once[0] = transit.at_once[3] = 0
+    forget_events(transit)
     t, turns, rank, lasted = z[0], 0, n, 0.0
     for i in range(n + 1):
         for j in range(n + 1):
             images[i, j] = 1.0 if i == j else 0.0
-    if transit.at_once[1] & 1 != 0:
+    if is_autonomous(transit):
         images[0, 0] = 0.0
     for j in range(n):
         transit.y[j] = z[1 + j]
@@ -229,7 +231,7 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
         push(images, n + 1, rate, transit.jac, transit.grad, transit.image)
         push(frame, rank, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or transit.at_once[1] & 1 != 0:
+        if reset or is_autonomous(transit):
             behind(functions, surface, t, p, images, n + 1, transit, workspace, reset)
             behind(functions, surface, t, p, frame, rank, transit, workspace, reset)
         lasted += duration
@@ -306,7 +308,7 @@ def solve_cycle(  # type: ignore[no-untyped-def]
         repels; ``AT_A_POINT`` if it has shrunk to one. ``cycle.rates`` holds the exponents.
     """
     n, time = cycle.transit.y.shape[0], turns * period
-    timeless = cycle.transit.at_once[1] & 1 != 0
+    timeless = is_autonomous(cycle.transit)
     before, moved, rate_before = np.inf, 0.0, 0.0
     sensitivity, amplified = 0.0, 0.0
     for step in range(_PASSES):

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from contfric.chaos.averaging import close_periods, grows, mean_rate, sign_of
+from contfric.chaos.tangent import is_autonomous
 from contfric.compiled import helper
 from contfric.orbit.cyclic import dense_solve
 from contfric.orbit.spectrum import spectrum
@@ -183,7 +184,7 @@ def starts_at_rest(functions, tables, ranks, t, p, transit, cycle, rows, cell): 
 @helper
 def write_quiet(functions, tables, ranks, mode, t, p, period, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a solution is that no surface cuts any more: at rest, of one period, or nothing."""
-    n, excited = transit.y.shape[0], transit.at_once[1] & 1 == 0
+    n, excited = transit.y.shape[0], not is_autonomous(transit)
     functions.flow(
         mode, t, transit.y, _SETTLES * period, p, rows.turns[:0], transit.image, transit.jac[:0]
     )
@@ -208,7 +209,7 @@ def write_quiet(functions, tables, ranks, mode, t, p, period, transit, cycle, ro
 def write_end(functions, outcome, ranks, mode, t, p, period, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
     """Write what a solution is that did not come to another joint."""
     if outcome == HELD:  # in an autonomous model a rank counts no shift in time
-        rank = ranks[mode] + (1 if transit.at_once[1] & 1 != 0 else 0)
+        rank = ranks[mode] + (1 if is_autonomous(transit) else 0)
         write_period(functions, rank, mode, t, p, period, transit, cycle, rows, cell)
         rows.motions[cell] = AT_REST
         return

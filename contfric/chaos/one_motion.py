@@ -20,6 +20,7 @@ from contfric.chaos.tangent import (
     any_time,
     behind,
     differentiate,
+    is_autonomous,
     orthonormalise,
     push,
     to_joint,
@@ -105,7 +106,7 @@ def carry_through_reset(functions, tables, ranks, mode, on, t, p, period, live, 
         live = min(live, ranks[mode])
         push(workspaces.frame, live, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
-        if reset or transit.at_once[1] & 1 != 0:
+        if reset or is_autonomous(transit):
             behind(functions, surface, t, p, workspaces.frame, live, transit, workspace, reset)
         if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN

@@ -14,7 +14,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
-from contfric.orbit.time_scale import clock_period, has_clock
+from contfric.orbit.time_scale import ticks_of
 
 
 class Starting(NamedTuple):
@@ -129,7 +129,7 @@ def follow(
         tables(model),
         starting(model),
         float(time),
-        _ticks(model, vectors),
+        np.array([ticks_of(model, vector) for vector in vectors]),
         np.ascontiguousarray(vectors),
         np.ascontiguousarray(states),
         limits,
@@ -138,13 +138,6 @@ def follow(
     )
     until_interrupted(follow_cells, arguments, flag if stop is None else None)
     return rows
-
-
-def _ticks(model: Model, vectors: FloatArray) -> FloatArray:
-    """Return the time from tick to tick at some parameters; 0 where a model has no clock."""
-    if not has_clock(model):
-        return np.zeros(len(vectors))
-    return np.array([clock_period(model, vector) for vector in vectors])
 
 
 def until_interrupted(kernel: Any, arguments: tuple[Any, ...], flag: IntArray | None) -> Any:

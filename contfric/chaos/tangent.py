@@ -37,7 +37,7 @@ from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
 from contfric.orbit.resting import still_bounced
-from contfric.orbit.sides import mode_after, sign_code
+from contfric.orbit.sides import mode_after
 from contfric.orbit.system import IntArray
 from contfric.orbit.together import mode_together
 from contfric.orbit.trajectory import (
@@ -50,13 +50,21 @@ from contfric.orbit.trajectory import (
     SLIDE_PERIODS,
     TOO_LARGE,
     StateWorkspace,
-    code_ahead,
     copy_state,
     first_hit,
-    leads_to_rest,
+    impacts_left,
+    sides_after,
     whole_turns,
 )
-from contfric.orbit.walls import MOST_AT_ONCE, NO_FLIGHT, NO_TIME, is_crossed, is_pressed, lying_on
+from contfric.orbit.walls import (
+    MOST_AT_ONCE,
+    NO_FLIGHT,
+    NO_TIME,
+    is_crossed,
+    is_pressed,
+    lying_on,
+    walls_of,
+)
 
 #: A transit has come to the next joint; otherwise it ended as a simulation does (HELD, IMPOSSIBLE,
 #: INFINITE, QUIET, CHATTER), or the integration broke down.
@@ -65,6 +73,13 @@ ARRIVED, BROKEN = 0, 10
 #: this factor grows without bound in a finite time (as 1/(time left) it has grown by 1e12), and one that
 #: is larger than this has grown already: levels of size 1 are rounding compared with it.
 _HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
+#: What a transit knows of events: how many in a row followed each other at once; what the model has; whether
+#: an impact was among them; 1 + the wall that was met last, if impacts go on alike since; how many impacts to
+#: come are known not to lead to rest.
+EVENTS = 5
+IN_A_ROW, MODEL, STRUCK, BOUNCED, LEFT = range(EVENTS)
+#: What a model has, added: no excitation, walls (resets), a clock.
+AUTONOMOUS, WALLS, CLOCK = 1, 2, 4
 
 
 class Transit(NamedTuple):
@@ -75,10 +90,7 @@ class Transit(NamedTuple):
     y, start : state, and start (t, y) of the segment, shapes (n,) and (1 + n,)
     jac, grad : derivatives of the segment's flow and of the observable at its end
     end, image : workspace for a state and for the image of a perturbation, shape (n,)
-    at_once : number of events in a row that followed each other at once; 1 if the model is autonomous,
-        plus 2 if it has resets, plus 4 if it has a clock; whether there was an impact among those events;
-        1 + the wall that was met last if impacts go on alike since, and how many to come are known not to
-        lead to rest; shape (5,)
+    events : what is known of events, by ``IN_A_ROW`` and so on, shape (EVENTS,)
     ahead, meets : duration of the next segment and the surface that ends it, where they are known beforehand,
         with the state there and the derivatives; else SINGLY as the surface; shapes (1,)
     """
@@ -89,15 +101,36 @@ class Transit(NamedTuple):
     grad: FloatArray
     end: FloatArray
     image: FloatArray
-    at_once: IntArray
+    events: IntArray
     ahead: FloatArray
     meets: IntArray
 
 
 @helper
+def set_model(transit, tables, timeless, ticks):  # type: ignore[no-untyped-def]
+    """Say what a model has; ``ticks`` is the time from tick to tick of its clock, 0 without one."""
+    has = WALLS * walls_of(tables)
+    has += AUTONOMOUS if timeless else 0
+    transit.events[MODEL] = has + (CLOCK if ticks > 0.0 else 0)
+
+
+@helper
+def forget_events(transit):  # type: ignore[no-untyped-def]
+    """Forget the events of another solution."""
+    transit.events[IN_A_ROW] = transit.events[STRUCK] = 0
+    transit.events[BOUNCED] = transit.events[LEFT] = 0
+
+
+@helper
+def is_autonomous(transit):  # type: ignore[no-untyped-def]
+    """Return whether the model has no excitation."""
+    return transit.events[MODEL] & AUTONOMOUS != 0
+
+
+@helper
 def any_time(transit):  # type: ignore[no-untyped-def]
     """Return whether any time may pass until a motion returns: it has neither excitation nor a clock."""
-    return transit.at_once[1] & 5 == 1
+    return transit.events[MODEL] & (AUTONOMOUS + CLOCK) == AUTONOMOUS
 
 
 @allocating_helper
@@ -110,7 +143,7 @@ def new_transit(n):  # type: ignore[no-untyped-def]
         np.empty(1 + n),
         np.empty(n),
         np.empty(n),
-        np.zeros(5, dtype=np.int64),
+        np.zeros(EVENTS, dtype=np.int64),
         np.zeros(1),
         np.full(1, SINGLY),
     )
@@ -124,6 +157,28 @@ def state_workspace(n):  # type: ignore[no-untyped-def]
 
 
 @helper
+def after_wall(functions, tables, mode, surface, following, t, p, period, transit, workspace):  # type: ignore[no-untyped-def]
+    """Return (whether a wall is pressed from now on, mode that follows the impact: chatter if it rests)."""
+    y, before = transit.y, workspace.after
+    pressed = is_pressed(
+        functions, tables, mode, surface, following, t, before, y, p, period, workspace
+    )
+    chatter = tables.chatters[following, surface]
+    if chatter < 0:
+        return pressed, following
+    left = 0
+    if not pressed:
+        known = transit.events[BOUNCED], transit.events[LEFT]
+        copy_state(before, transit.end)
+        left = impacts_left(functions, tables, chatter, surface, t, y, p, period, known, workspace)
+        copy_state(transit.end, before)
+    transit.events[LEFT] = left
+    if left == 0:
+        return False, chatter
+    return pressed, following
+
+
+@helper
 def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # type: ignore[no-untyped-def]
     """Go on to the next joint; a surface that is only touched is passed.
 
@@ -132,12 +187,12 @@ def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # 
     tuple
         (outcome, surface, mode that follows, duration, periods completed, phase).
     """
-    y, observables = transit.y, tables.observables
+    y = transit.y
     transit.start[0] = t
     for j in range(y.shape[0]):
         transit.start[1 + j] = y[j]
     duration, turns = 0.0, 0
-    at_most = NO_FLIGHT if transit.at_once[1] & 2 != 0 else NO_TIME
+    at_most = NO_FLIGHT if transit.events[MODEL] & WALLS != 0 else NO_TIME
     longest = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * period
     for k in range(tables.flights.shape[0]):
         if tables.flights[k] >= 0:  # after a wall it may begin at rest on a section
@@ -159,52 +214,29 @@ def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # 
         for j in range(y.shape[0]):
             if not abs(y[j]) < TOO_LARGE:
                 why = CHATTER  # flights too short to be resolved
-                if transit.at_once[2] == 0 or transit.at_once[0] == 0:
+                if transit.events[STRUCK] == 0 or transit.events[IN_A_ROW] == 0:
                     why = too_large(functions, mode, duration, p, transit, workspace)
                 return why, surface, mode, duration, turns, t
         reset = tables.bounds[mode, surface] == 2
-        transit.at_once[0] = transit.at_once[0] + 1 if tau <= at_most * period else 0
-        struck = reset or (transit.at_once[2] != 0 and transit.at_once[0] > 0)
-        transit.at_once[2] = 1 if struck else 0
-        if transit.at_once[0] > MOST_AT_ONCE:
+        transit.events[IN_A_ROW] = transit.events[IN_A_ROW] + 1 if tau <= at_most * period else 0
+        struck = reset or (transit.events[STRUCK] != 0 and transit.events[IN_A_ROW] > 0)
+        transit.events[STRUCK] = 1 if struck else 0
+        if transit.events[IN_A_ROW] > MOST_AT_ONCE:
             return CHATTER if struck else IMPOSSIBLE, surface, mode, duration, turns, t
         if reset:  # the state before it stays where the hit has left it
             functions.reset(surface, t, workspace.after, p, workspace.none, y, workspace.nothing)
-        landed = tables.landed[mode, surface]
-        code = sign_code(functions, observables, landed, t, y, p, workspace.none, workspace.empty)
-        if tables.flights[mode] >= 0:
-            code = code_ahead(functions, tables, mode, surface, t, y, p, period, workspace)
+        code = sides_after(functions, tables, mode, surface, t, y, p, period, workspace)
         following = mode_after(tables, mode, surface, code)
         if following == -1 and not reset:
             following = mode_together(functions, tables, mode, surface, code, t, y, p, workspace)
         if following >= 0:
-            pressed = reset and is_pressed(
-                functions,
-                tables,
-                mode,
-                surface,
-                following,
-                t,
-                workspace.after,
-                y,
-                p,
-                period,
-                workspace,
-            )
-            chatter = tables.chatters[following, surface] if reset else -1
-            if chatter >= 0:
-                transit.at_once[4] -= 1
-                anew = transit.at_once[3] != 1 + surface or transit.at_once[4] <= 0
-                if anew and not pressed:
-                    copy_state(workspace.after, transit.end)
-                    transit.at_once[4] = leads_to_rest(
-                        functions, tables, chatter, surface, t, y, p, period, workspace
-                    )
-                    copy_state(transit.end, workspace.after)
-                if pressed or transit.at_once[4] == 0:
-                    following, pressed = chatter, False
-            alike = still_bounced(tables, mode, following, transit.at_once[3])
-            transit.at_once[3] = 1 + surface if reset else alike
+            pressed = False
+            if reset:
+                pressed, following = after_wall(
+                    functions, tables, mode, surface, following, t, p, period, transit, workspace
+                )
+            alike = still_bounced(tables, mode, following, transit.events[BOUNCED])
+            transit.events[BOUNCED] = 1 + surface if reset else alike
             why = CHATTER if pressed else ARRIVED
             return why, surface, following, duration, turns, t
         if reset or is_crossed(functions, tables, mode, surface, t, y, p, period, workspace):
@@ -245,7 +277,7 @@ def differentiate(functions, observable, mode, duration, t, p, transit, none):  
     jac, grad, start = transit.jac, transit.grad, transit.start
     if transit.meets[0] == SINGLY:
         functions.flow(mode, start[0], start[1:], duration, p, none, transit.end, jac)
-    met = transit.end if transit.at_once[1] & 2 != 0 else transit.y  # before a reset
+    met = transit.end if transit.events[MODEL] & WALLS != 0 else transit.y  # before a reset
     functions.observe(observable, t, met, p, none, grad)
     rate = grad[0]
     for k in range(n):
@@ -259,7 +291,7 @@ def behind(functions, surface, t, p, frame, count, transit, workspace, reset):  
     if reset:
         functions.reset(surface, t, workspace.after, p, workspace.none, transit.end, transit.jac)
         apply_reset(frame, count, transit.jac, transit.image)
-    if transit.at_once[1] & 1 != 0:
+    if transit.events[MODEL] & AUTONOMOUS != 0:
         for i in range(count):
             frame[i, 0] = 0.0
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.chaos.averaging import Averages, new_averages
 from contfric.chaos.cycle import CycleWorkspace, Memory, new_cycle_workspace, new_memory
-from contfric.chaos.tangent import Transit, new_transit, state_workspace
+from contfric.chaos.tangent import EVENTS, Transit, new_transit, state_workspace
 from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.references import by_reference, words_of
 from contfric.flow.without import SINGLY
@@ -45,7 +45,7 @@ def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
             transit.grad,
             transit.end,
             transit.image,
-            np.zeros((width, 5), dtype=np.int64),
+            np.zeros((width, EVENTS), dtype=np.int64),
             np.zeros(width),
             np.full(width, SINGLY),
         ),
@@ -91,7 +91,7 @@ def place(space, k):  # type: ignore[no-untyped-def]
             transit.grad,
             transit.end,
             transit.image,
-            transit.at_once[k],
+            transit.events[k],
             transit.ahead[k : k + 1],
             transit.meets[k : k + 1],
         ),

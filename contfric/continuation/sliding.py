@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.holds_forward import with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
@@ -104,24 +102,21 @@ def _first_located(
     """
     from contfric.continuation.bracket import BY_TEST
 
-    count = len(orbit.system.tests)
-    violated = np.flatnonzero(after.tests[:count] < 0.0)
-    left = np.clip(before.tests[violated], 0.0, 1e3)
-    order = np.argsort(left / (left - after.tests[violated]), kind="stable")
-    found: list[tuple[float, int, Point]] = []
-    first: Point | None = None
-    for k in violated[order].tolist():
+    ends = zip(before.tests.tolist(), after.tests[: len(orbit.system.tests)].tolist(), strict=False)
+    share = {}  # of the step, to where the secant of a violated margin vanishes
+    for k, (value, last) in enumerate(ends):
+        if last < 0.0:
+            left = min(max(value, 0.0), 1e3)  # some are infinite
+            share[k] = left / (left - last)
+    best: tuple[float, int, Point] | None = None
+    for k in sorted(share, key=share.__getitem__):
         change = float(before.tests[k] - after.tests[k])
-        if first is not None and not first.lost and first.tests[k] > _BEHIND * change:
+        if best is not None and not best[2].lost and best[2].tests[k] > _BEHIND * change:
             continue
         point = locate_change(orbit, before, after, settings, BY_TEST, k)
-        if point is not None:
-            found.append((point.arc, k, point))
-            first = min(found, key=lambda item: item[:2])[2]
-    if first is None:
-        return None
-    _, k, first = min(found, key=lambda item: item[:2])
-    return k, first
+        if point is not None and (best is None or (point.arc, k) < best[:2]):
+            best = point.arc, k, point
+    return None if best is None else best[1:]
 
 
 def _pulled_in(

@@ -43,8 +43,10 @@ def nearer_than_twins(
     ----------
     before, point : a point of the branch, and what was located after it
     """
-    then, now = _lasts(orbit.system, before, orbit), _lasts(orbit.system, point, orbit)
-    twins = _lost_twins(then, now, SHORT * time_unit(orbit), orbit)
+    now, most = _lasts(orbit.system, point, orbit), SHORT * time_unit(orbit)
+    if orbit.model.autonomous or not now.min() < most:
+        return None
+    twins = _lost_twins(_lasts(orbit.system, before, orbit), now)
     if not twins:
         return None
     tip, active = before, orbit.model.index_of(settings.parameter)
@@ -78,10 +80,10 @@ def _rates(point: Point) -> FloatArray:
     return rates
 
 
-def _lost_twins(then: FloatArray, now: FloatArray, most: float, orbit: Orbit) -> list[int]:
+def _lost_twins(then: FloatArray, now: FloatArray) -> list[int]:
     """Return the segments that had one length, of which one has vanished without the other; none: empty."""
     gone = int(np.argmin(now))
-    if orbit.model.autonomous or not now[gone] < _UNEQUAL * then[gone] or not now[gone] < most:
+    if not now[gone] < _UNEQUAL * then[gone]:
         return []
     equal = np.flatnonzero(np.abs(then - then[gone]) <= _EQUAL * then[gone]).tolist()
     lost = any(now[i] - now[gone] > _UNEQUAL * then[gone] for i in equal)

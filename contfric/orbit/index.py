@@ -32,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contfric.models.definition import FloatArray, Model
+from contfric.models.view import FlowView
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import System, inside_sign
@@ -143,16 +144,23 @@ def index_at_infinity(model: Model, vector: FloatArray) -> int | None:
     """
     if model.autonomous or model.resets:
         return None
-    n, flow = len(model.states), model.view(vector)
-    first = np.empty(0)
-    for share in (_SOON, 1.0):  # over a short time it costs little to see that the modes differ
-        lasts, first = share * flow.period, np.empty(0)
-        for mode in (mode.name for mode in model.modes if not mode.sliding):
-            for size in (1.0, 17.0):
-                start = size * np.cos(np.arange(1.0, n + 1.0))
-                found = flow.jacobian(mode, 0.0, start, lasts)[:, 1 : 1 + n]
-                first = first if len(first) else found
-                apart, least = np.max(np.abs(found - first)), 1.0 + np.max(np.abs(first))
-                if not apart <= _LINEAR * least:
-                    return None
-    return _sign(np.eye(n) - first)
+    flow = model.view(vector)
+    if _linear_part(flow, _SOON * flow.period) is None:  # which is seen at little cost
+        return None
+    linear = _linear_part(flow, flow.period)
+    return None if linear is None else _sign(np.eye(len(linear)) - linear)
+
+
+def _linear_part(flow: FlowView, lasts: float) -> FloatArray | None:
+    """Return the derivative of the state after some time, if it is the same in all modes and everywhere."""
+    n = len(flow.model.states)
+    moving = [mode.name for mode in flow.model.modes if not mode.sliding]
+    starts = [size * np.cos(np.arange(1.0, n + 1.0)) for size in (1.0, 17.0)]
+    found = (
+        flow.jacobian(mode, 0.0, start, lasts)[:, 1 : 1 + n] for mode in moving for start in starts
+    )
+    first = next(found, None)
+    if first is None:  # nothing moves
+        return None
+    most = _LINEAR * (1.0 + float(np.max(np.abs(first))))
+    return first if all(np.max(np.abs(other - first)) <= most for other in found) else None

@@ -28,10 +28,8 @@ def impacts_ahead(functions, tables, chatter, surface, t, y, p, unit, workspace)
     none, empty, nothing = workspace.none, workspace.empty, workspace.nothing
     state, struck_at, c = workspace.after, workspace.trial, tables.observables[surface]
     above, below = tables.flights[chatter], tables.flights[tables.flights.shape[0] // 2 + chatter]
-    level, excited = (
-        functions.level(surface, p, none, empty),
-        functions.period(p, none, empty) > 0.0,
-    )
+    level = functions.level(surface, p, none, empty)
+    excited = functions.period(p, none, empty) > 0.0
     for j in range(y.shape[0]):
         state[j] = y[j]
     side = 1.0 if functions.rate(above, c, t, y, p, none, empty) > 0.0 else -1.0

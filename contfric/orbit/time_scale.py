@@ -63,9 +63,14 @@ def clock_period(model: Model, vector: FloatArray) -> float:
     >>> round(clock_period(buck, buck.vector({})), 12)
     4.0
     """
-    return model.view(vector).level(TICK) if has_clock(model) else 1.0
+    return ticks_of(model, vector) or 1.0
 
 
 def has_clock(model: Model) -> bool:
     """Return whether a model has a clock, whose periods are what its user calls so."""
     return CLOCK in model.states and any(reset.surface == TICK for reset in model.resets)
+
+
+def ticks_of(model: Model, vector: FloatArray) -> float:
+    """Return the time from tick to tick of a model's clock; 0 without one."""
+    return model.view(vector).level(TICK) if has_clock(model) else 0.0

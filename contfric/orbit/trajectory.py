@@ -15,7 +15,6 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
-from contfric.flow.chatter import FASTER
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.orbit.resting import impacts_ahead, still_bounced
@@ -67,13 +66,10 @@ _WIDER = 4.0
 _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
-#: 1 + the wall that was met last if impacts go on alike since, the speed after that impact, the impacts to
-#: come of which it is known that they do not lead to rest, and the unit of time of a model without excitation
-#: (1 if less).
-CARRIED = 11
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, SPEED, AHEAD, UNIT = range(
-    CARRIED
-)
+#: 1 + the wall that was met last if impacts go on alike since, how many impacts to come are known not to lead
+#: to rest, and the unit of time of a model without excitation (1 if less).
+CARRIED = 10
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, LEFT, UNIT = range(CARRIED)
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -238,6 +234,19 @@ def too_large(y):  # type: ignore[no-untyped-def]
 
 
 @helper
+def impacts_left(functions, tables, chatter, surface, t, y, p, unit, known, workspace):  # type: ignore[no-untyped-def]
+    """Return how many impacts, this one among them, are known not to lead to rest; 0 if this one does.
+
+    ``known`` is (1 + the wall that was met last if impacts go on alike since, that number then).
+    ``workspace.after`` is written over.
+    """
+    bounced, left = known
+    if bounced == 1 + surface and left > 1:
+        return left - 1
+    return leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
+
+
+@helper
 def write_event(rows, event, mode, surface, cycle, t):  # type: ignore[no-untyped-def]
     """Write an event, but for its state."""
     rows.joints[event, 0] = mode
@@ -261,8 +270,8 @@ def after_impact(  # type: ignore[no-untyped-def]
 ):
     """Return (whether the wall is pressed from now on, mode of the chatter that begins; -1 if none does).
 
-    All impacts after another event, or after a throw, are one chatter, or none is. ``struck_at`` is the
-    state before the impact, y that after it.
+    All impacts that go on alike are one chatter, or none is. ``struck_at`` is the state before the impact, y
+    that after it.
     """
     pressed = is_pressed(
         functions, tables, mode, surface, target, t, struck_at, y, p, unit, workspace
@@ -270,15 +279,13 @@ def after_impact(  # type: ignore[no-untyped-def]
     chatter = tables.chatters[target, surface] if target >= 0 else -1
     if chatter < 0:
         return pressed, -1
-    before, c = carry[SPEED], tables.observables[surface]
-    carry[SPEED] = abs(functions.rate(target, c, t, y, p, workspace.none, workspace.empty))
-    carry[AHEAD] -= 1.0
-    anew = int(carry[BOUNCED]) != 1 + surface or not carry[AHEAD] > 0.0
-    anew = anew or carry[SPEED] > FASTER * before or carry[AT_ONCE] > MOST_AT_ONCE
-    if anew and not pressed:
-        carry[AHEAD] = leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
-    rests = pressed or (anew and carry[AHEAD] == 0.0)
-    return pressed, chatter if rests else -1
+    left = 0
+    if not pressed:
+        bounced = 0 if carry[AT_ONCE] > MOST_AT_ONCE else int(carry[BOUNCED])
+        known = bounced, int(carry[LEFT])
+        left = impacts_left(functions, tables, chatter, surface, t, y, p, unit, known, workspace)
+    carry[LEFT] = float(left)
+    return pressed, chatter if left == 0 else -1
 
 
 @helper

@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -32,7 +31,6 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.system import IntArray
-from contfric.orbit.time_scale import clock_period
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
 from contfric.response.basins import Basins
@@ -138,7 +136,7 @@ def basins(
     periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)
     shape = tuple(len(values) for values in axes.values())
     _check_size(model, axes)
-    period, periods = model.view(vector).period, ceil(periods * clock_period(model, vector))
+    period = model.view(vector).period
     states = _states(model, axes, fixed)
     job = _BasinJob(vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)

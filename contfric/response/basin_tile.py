@@ -13,7 +13,7 @@ from contfric.chaos.work import TileTask
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
-from contfric.orbit.time_scale import clock_period
+from contfric.orbit.time_scale import ticks_of
 from contfric.response.targets import Targets
 
 #: Periods before the growth of a separation is averaged, and its relative error, for what no orbit has
@@ -45,7 +45,7 @@ class BasinTile(TileTask):
     vector : parameters
     targets : joints of the orbits that are known
     time, states : initial time and states, shape (starts, n)
-    periods : periods that a solution is followed
+    periods : periods (of the excitation or of a clock; else units of time) that a solution is followed
     """
 
     model: Model
@@ -76,6 +76,7 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
         starting(task.model),
         task.targets,
         float(task.time),
+        ticks_of(task.model, task.vector),
         task.vector,
         np.ascontiguousarray(task.states),
         int(task.periods),
@@ -99,8 +100,7 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
     open_ = np.flatnonzero(free & ~np.isin(ends, list(known)))
     if len(open_) and (stop is None or stop[0] == 0):
         vectors = np.tile(task.vector, (len(open_), 1))
-        periods = round(task.periods / clock_period(task.model, task.vector))
-        limits = FollowingLimits(_TRANSIENT, max(1, periods), _TOLERANCE)
+        limits = FollowingLimits(_TRANSIENT, max(1, task.periods), _TOLERANCE)
         cells = follow(task.model, vectors, task.states[open_], task.time, limits, stop)
         motions[open_] = cells.motions
     return BasinRows(labels.astype(np.int32), motions)

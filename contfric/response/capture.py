@@ -13,12 +13,18 @@ from numba import types
 
 from contfric.chaos.cells import StartingType
 from contfric.chaos.starting import start_mode
-from contfric.chaos.tangent import ARRIVED, new_transit, state_workspace, to_joint
+from contfric.chaos.tangent import (
+    ARRIVED,
+    forget_events,
+    new_transit,
+    set_model,
+    state_workspace,
+    to_joint,
+)
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.orbit.sides import surfaces_after
 from contfric.orbit.trajectory import TablesType
-from contfric.orbit.walls import walls_of
 from contfric.response.targets import Targets
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)
@@ -52,6 +58,7 @@ def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def
         StartingType,
         TargetsType,
         f8,
+        f8,
         vector,
         matrix,
         i8,
@@ -62,12 +69,25 @@ def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def
     )
 )
 def capture(  # type: ignore[no-untyped-def]
-    functions, tables, starting, targets, time, p, states, periods, stop, labels, ends, followed
+    functions,
+    tables,
+    starting,
+    targets,
+    time,
+    ticks,
+    p,
+    states,
+    periods,
+    stop,
+    labels,
+    ends,
+    followed,
 ):
     """Follow solutions from ``states`` at ``time`` until an orbit catches them, or the periods are over.
 
     Parameters
     ----------
+    ticks : time from tick to tick of a clock, 0 of a model without
     stop : another thread writes a 1 to it when nobody waits for the result any more
     labels, ends, followed : orbit, -1 if none; how a solution without one ended, as simulations do,
         ``NO_START`` or ``NOT_YET``; periods followed; shape (k,)
@@ -77,15 +97,15 @@ def capture(  # type: ignore[no-untyped-def]
     period = functions.period(p, workspace.none, workspace.empty)
     timeless = period <= 0.0
     if timeless:
-        period = 1.0
-    transit.at_once[1] = 2 * walls_of(tables) + (1 if timeless else 0)
+        period = ticks if ticks > 0.0 else 1.0  # periods of the clock, or units of time
+    set_model(transit, tables, timeless, ticks)
     phase = time if timeless else time - math.floor(time / period) * period
     for cell in range(states.shape[0]):
         if stop[0] != 0:
             break
         for j in range(n):
             transit.y[j] = states[cell, j]
-        transit.at_once[0] = transit.at_once[2] = transit.at_once[3] = 0
+        forget_events(transit)
         labels[cell], ends[cell], cycle, t = -1, NOT_YET, 0, phase
         mode, on = start_mode(functions, tables, starting, time, transit.y, p, workspace)
         if mode < 0:
