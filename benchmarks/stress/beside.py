@@ -97,7 +97,7 @@ def beside(
 def _offsets(event: cf.Bifurcation, parameter: str) -> Iterator[tuple[str, float]]:
     """Yield how far from the event to look, with a name for it."""
     for sign in (1.0, -1.0):
-        yield "1e-10 beside", sign * NEAR
+        yield "within 1e-10", sign * NEAR
     if event.kind not in ("CS", "SS"):
         return
     k = event.orbit.system.tests.index(event.tests[0])
