@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +15,9 @@ from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
+
+#: Halvings of a step of at most an eighth of a segment: what is left is a rounding error of its length.
+_HALVINGS = 50
 
 
 @dataclass(frozen=True)
@@ -62,8 +64,6 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
 
 def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
     """Return times at which transparent surfaces are crossed inside a segment, in order."""
-    from scipy.optimize import brentq
-
     found: list[tuple[float, str]] = []
     for surface in orbit.model.surfaces:
         if surface.switching and surface.name not in orbit.model.section_surfaces:
@@ -76,10 +76,25 @@ def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tupl
         # a sample on the surface (a joint, or the middle of a solution) has no side
         sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
         for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):
-            bracket = times[sided[k : k + 2]]
-            time = brentq(partial(_height, orbit, name), *bracket)
-            found.append((float(time), name))
+            low, high = (float(times[place]) for place in sided[k : k + 2])
+            found.append((_crossing(orbit, name, low, high), name))
     return sorted(found)
+
+
+def _crossing(orbit: Orbit, surface: str, low: float, high: float) -> float:
+    """Return a time between two others, of which one is above a surface and one below.
+
+    Halving needs nothing but signs; ``scipy.optimize`` takes longer to load than both figures of an orbit
+    and a diagram to draw.
+    """
+    rises = _height(orbit, surface, low) < 0.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if (_height(orbit, surface, middle) < 0.0) == rises:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 def _height(orbit: Orbit, surface: str, time: float) -> float:

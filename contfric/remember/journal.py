@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache, wraps
-from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -58,7 +58,7 @@ def program() -> str:
     """Return a digest of the program: all its sources, and what else may change the last digits."""
     content = hashlib.blake2b(package_digest().encode(), digest_size=_SIZE)
     for name in _NUMERICS:
-        content.update(f"{name} {import_module(name).__version__}".encode())
+        content.update(f"{name} {version(name)}".encode())
     return content.hexdigest()
 
 
