@@ -210,6 +210,37 @@ def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_
         assert any(w * width < o < w for w, o in zip(known, own, strict=True)), (known, own)
 
 
+def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> None:
+    """Next to a slide of no length a multiplier passes 1 at a distance in proportion to the damping.
+
+    What leaves the branch point there ends at once: it was refused, and with it a bridge and a branch over
+    half of the range that nothing else leads to. At the largest damping Newton's method solves for it.
+    """
+    found, lengths = restarts.scene(45, 7), []
+    rng = np.random.default_rng(0)
+    for damping in (1e-5, *10.0 ** rng.uniform(-8.5, -5.5, 3)):
+        orbit = cf.find_orbit("coulomb", {**found.params, "zeta": float(damping)}, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert len(explored.branches) == 13 and not explored.loose_ends, damping
+        (short,) = (b for b in explored.branches if b.arc[-1] < 1e-4 and not b.mirrored)
+        assert [end.reason.name for end in short.ends] == ["BP", "SS"]
+        assert all(o.admissible and o.converged and o.residual < 1e-12 for o in short), damping
+        assert explored.verify(restarts=2).passed, damping
+        lengths.append(float(short.arc[-1]) / damping)
+    assert np.ptp(lengths) < 0.02 * lengths[0], lengths
+
+
+@pytest.mark.slow
+def test_a_bridge_that_begins_where_a_short_branch_ends() -> None:
+    """What is held is negative between that end and the next event, by the square of 1e-8: it began there."""
+    found = restarts.scene(42, 56)
+    for damping in (1e-9, 2e-9):
+        orbit = cf.find_orbit("coulomb", {**found.params, "zeta": damping}, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert not explored.loose_ends and len(explored.branches) == 11, damping
+        assert explored.verify(restarts=4).passed, damping
+
+
 def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
     """Damping of 1e-9: a bridge ends 1e-8 from a branch point, nearer than what leaves it can be started."""
     found = restarts.scene(42, 56)
