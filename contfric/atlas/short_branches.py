@@ -7,13 +7,15 @@ length: asymmetric orbits and bridges go on from there, and nothing else leads t
 
 The equations tell the parameter of the branch at a distance a from the vertex to rounding over a: what sets
 it is the odd part of the equations, which is in proportion to a. The vertex itself is known to rounding (it
-is located on the simpler orbit), and the branch leaves it along the null vector, from which it departs by the
-square of a. Nearer than the third root of rounding the tangent is nearer to the branch than what is solved.
+is located on the simpler orbit). The branch leaves it along the null vector as a parabola, whose bend is
+known from an orbit at a distance of 1e-3: what that misses is of order ``1e-3 a^2``, and of the parameter,
+which is even in a, ``1e-6 a^2``. Nearer than the fourth root of rounding that is less than what a solved
+orbit is off by.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -32,21 +34,92 @@ from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import null_vector, settings_value
+from contfric.continuation.switching import LEAVE, null_vector, settings_value
 from contfric.continuation.vertices import symmetric_part, symmetrised, undoubled, undoubled_part
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
+#: Where the bend of a branch is told from, and at which share of that it must be the same: up to this share
+#: of itself.
+_BEND, _NEARER, _MISSED = LEAVE, 0.25, 0.2
+#: How near a bridge begins that may begin there, in such distances.
+_AT_ONCE = 0.1
 
-def straight(orbit: Orbit) -> float:
-    """Return how far from a vertex the tangent is nearer to the branch than what is solved."""
-    return float(orbit.model.rounding ** (1.0 / 3.0))
+
+def nearest(orbit: Orbit) -> float:
+    """Return how far from a vertex a parabola is nearer to the branch than what is solved."""
+    return float(orbit.model.rounding**0.25)
+
+
+@dataclass(frozen=True, eq=False)
+class _Parabola:
+    """A branch near the vertex that it leaves: ``joints + a phi + a^2 bend``, ``value + a^2 rise``."""
+
+    orbit: Orbit
+    phi: FloatArray
+    bend: FloatArray
+    rise: float
+    beside: Point
+    settings: Settings
+
+    def at(self, distance: float) -> Orbit:
+        """Return the orbit at a distance from the vertex."""
+        orbit, vector = self.orbit, self.orbit.vector.copy()
+        vector[orbit.model.index_of(self.settings.parameter)] += distance**2 * self.rise
+        joints = orbit.joints + distance * (self.phi + distance * self.bend)
+        return replace(orbit, joints=joints, vector=vector)
+
+    def point(self, distance: float) -> Point:
+        """Return the same as a point; multipliers are those next to it."""
+        here = self.at(distance)
+        return replace(
+            self.beside,
+            joints=here.joints,
+            w=np.array([settings_value(here, self.settings)]),
+            tangent=self.phi,
+            direction=np.array([2.0 * distance * self.rise]),
+            arc=distance,
+            labels=here.labels,
+        )
+
+    def first_end(self) -> tuple[int, float] | None:
+        """Return the margin that vanishes first, and where; None if none does so near."""
+        farthest = nearest(self.orbit)
+        here, there = self.orbit.margins, self.at(farthest).margins
+
+        def margin(distance: float, k: int) -> float:
+            return float(self.at(distance).margins[k])
+
+        ends = {
+            k: float(brentq(margin, 0.0, farthest, (k,), xtol=1e-18, rtol=1e-12))
+            for k in np.flatnonzero((here > 0.0) & (there < 0.0)).tolist()
+        }
+        return min(ends.items(), key=lambda pair: pair[1]) if ends else None
+
+
+def _parabola(orbit: Orbit, phi: FloatArray, settings: Settings) -> _Parabola | None:
+    """Return the branch along a null vector as a parabola; None if it is none where its bend is told from."""
+    value = settings_value(orbit, settings)
+    found = []
+    for distance in (_BEND, _NEARER * _BEND):
+        moved = replace(orbit, joints=orbit.joints + distance * phi)
+        point = first_point(moved, settings, phi, 0.0)
+        if point is None:
+            return None
+        bend = (point.joints - moved.joints) / distance**2
+        found.append((bend, (point.value - value) / distance**2, point))
+    (bend, rise, beside), (nearer, other, _) = found
+    misses = np.max(np.abs(bend - nearer)), abs(rise - other) / settings.width
+    size = np.max(np.abs(bend)) + abs(rise) / settings.width
+    if max(misses) > _MISSED * size:
+        return None
+    return _Parabola(orbit, phi, bend, rise, beside, settings)
 
 
 def is_short(branch: Branch) -> bool:
     """Tell whether a branch is one that ends nearer to its vertex than its orbits can be solved for."""
     from_vertex = any(end.reason in (EndReason.BP, EndReason.PD) for end in branch.ends)
-    return from_vertex and bool(branch.arc[-1] <= straight(branch[0]))
+    return from_vertex and bool(branch.arc[-1] <= nearest(branch[0]))
 
 
 def leave_short(state: Exploration, orbit: Orbit, event: Event, end: EndReason, text: str) -> bool:
@@ -104,7 +177,7 @@ def begins_at_short(state: Exploration, event: Event) -> None:
     if len(event.branches) != 1 or not is_short(state.branches[event.branches[0]]):
         return
     b, width = event.bifurcation, state.settings.width
-    near = 2.0 * straight(b.orbit)
+    near = _AT_ONCE * nearest(b.orbit)
     for index, branch in enumerate(state.branches):
         system = branch.system
         if not system.holds or system.half or system.periods != b.orbit.as_whole().periods:
@@ -132,21 +205,21 @@ def short_branch(
     phi : its null vector, one way
     """
     phi = null_vector(orbit) if phi is None else phi
-    found = _first_end(orbit, phi)
-    if found is None:
+    tip = replace(orbit, joints=orbit.joints + nearest(orbit) * phi)
+    if not np.any((orbit.margins > 0.0) & (tip.margins < 0.0)):
+        return None  # as most branches do it goes farther
+    curve = _parabola(orbit, phi, settings)
+    found = None if curve is None else curve.first_end()
+    if curve is None or found is None:
         return None
     test, distance = found
-    away = replace(orbit, joints=orbit.joints + straight(orbit) * phi)
-    beside = first_point(away, settings, phi, 0.0)  # at the vertex itself it has no unique tangent
-    if beside is None:
-        return None
-    points = [_along(orbit, beside, phi, a, settings) for a in (0.0, 0.5 * distance, distance)]
+    points = [curve.point(a) for a in (0.0, 0.5 * distance, distance)]
     active = orbit.model.index_of(settings.parameter)
     here = points[-1].orbit(orbit.system, orbit.vector, active)
     kind = kind_of_margin(orbit.system, orbit.system.tests[test], here)
     if kind not in TERMINAL:
         return None
-    known = event.bifurcation.accuracy + distance**2 / settings.width
+    known = event.bifurcation.accuracy + (_BEND * distance) ** 2 / settings.width
     last = bifurcation_at(
         kind, here, points[0], None, points[-1], settings, (orbit.system.tests[test],)
     )
@@ -163,7 +236,7 @@ def short_branch_to(orbit: Orbit, settings: Settings, event: Event) -> Branch | 
 
     Where the event is known roughly the symmetric orbit of the vertex is taken for that at the event.
     """
-    active, near = orbit.model.index_of(settings.parameter), 2.0 * straight(orbit)
+    active, near = orbit.model.index_of(settings.parameter), 2.0 * nearest(orbit)
     if orbit.system.holds or event.bifurcation.orbit.system.half:
         return None
     if orbit.system.half:
@@ -197,35 +270,3 @@ def _meets(branch: Branch, event: Event, settings: Settings) -> bool:
     last = branch.ends[1].bifurcation
     assert last is not None
     return same_event(last, event.bifurcation, settings.parameter, settings.width)
-
-
-def _along(
-    orbit: Orbit, beside: Point, phi: FloatArray, distance: float, settings: Settings
-) -> Point:
-    """Return the point of the tangent at a distance from the vertex; multipliers are those next to it."""
-    here = replace(orbit, joints=orbit.joints + distance * phi)
-    w, still = np.array([settings_value(orbit, settings)]), np.zeros(1)
-    return replace(
-        beside,
-        joints=here.joints,
-        w=w,
-        tangent=phi,
-        direction=still,
-        arc=distance,
-        labels=here.labels,
-    )
-
-
-def _first_end(orbit: Orbit, phi: FloatArray) -> tuple[int, float] | None:
-    """Return the margin that vanishes first along the null vector, and where; None if none does at once."""
-    farthest = straight(orbit)
-
-    def margins(distance: float) -> FloatArray:
-        return replace(orbit, joints=orbit.joints + distance * phi).margins
-
-    here, there = orbit.margins, margins(farthest)
-    ends = {
-        k: brentq(lambda a, k=k: float(margins(a)[k]), 0.0, farthest, xtol=1e-18, rtol=1e-12)
-        for k in np.flatnonzero((here > 0.0) & (there < 0.0)).tolist()
-    }
-    return min(ends.items(), key=lambda pair: pair[1]) if ends else None

@@ -214,15 +214,15 @@ def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> N
     """Next to a slide of no length a multiplier passes 1 at a distance in proportion to the damping.
 
     What leaves the branch point there ends at once: it was refused, and with it a bridge and a branch over
-    half of the range that nothing else leads to. At the largest damping Newton's method solves for it.
+    half of the range that nothing else leads to. At the largest damping Newton's method solves for all of it.
     """
     found, lengths = restarts.scene(45, 7), []
     rng = np.random.default_rng(0)
-    for damping in (1e-5, *10.0 ** rng.uniform(-8.5, -5.5, 3)):
+    for damping in (1e-4, *10.0 ** rng.uniform(-8.5, -5.5, 2)):
         orbit = cf.find_orbit("coulomb", {**found.params, "zeta": float(damping)}, longest=1000)
         explored = cf.explore(orbit, found.vary, found.range)
         assert len(explored.branches) == 13 and not explored.loose_ends, damping
-        (short,) = (b for b in explored.branches if b.arc[-1] < 1e-4 and not b.mirrored)
+        (short,) = (b for b in explored.branches if b.arc[-1] < 1e-3 and not b.mirrored)
         assert [end.reason.name for end in short.ends] == ["BP", "SS"]
         assert all(o.admissible and o.converged and o.residual < 1e-12 for o in short), damping
         assert explored.verify(restarts=2).passed, damping
@@ -234,7 +234,7 @@ def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> N
 def test_a_bridge_that_begins_where_a_short_branch_ends() -> None:
     """What is held is negative between that end and the next event, by the square of 1e-8: it began there."""
     found = restarts.scene(42, 56)
-    for damping in (1e-9, 2e-9):
+    for damping in (1e-9, 7e-10, 3e-7):
         orbit = cf.find_orbit("coulomb", {**found.params, "zeta": damping}, longest=1000)
         explored = cf.explore(orbit, found.vary, found.range)
         assert not explored.loose_ends and len(explored.branches) == 11, damping
