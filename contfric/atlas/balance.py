@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
+from contfric.atlas.short_branches import is_short
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import Bifurcation, EndReason, Kind
@@ -290,9 +291,12 @@ def _beside(
     if np.any(far):
         k = int(min(np.flatnonzero(far), key=lambda j: abs(branch.arc[j] - position)))
         return int(np.sign(branch.values[k] - value)), branch[k]
-    if following is None:
+    if following is None or is_short(branch):
         return None
-    solved = _solved_at(branch, 0.5 * (position + reach))
+    # in the middle of what is beyond the slack, where the parameter goes on to the next event
+    ahead_by = abs(following.params[branch.parameter] - value)
+    share = 0.5 * (1.0 + slack / ahead_by) if ahead_by > slack else 0.5
+    solved = _solved_at(branch, position + share * (reach - position))
     if solved is None:
         return None
     gap = solved.params[branch.parameter] - value

@@ -66,6 +66,12 @@ class Event:
     begun: bool = False
     paired: bool = False
 
+    def take_better(self, end: End) -> None:
+        """Take the event as a branch that ends there has it, where that knows it better."""
+        assert end.bifurcation is not None
+        if end.bifurcation.accuracy < self.bifurcation.accuracy:
+            self.bifurcation = end.bifurcation
+
 
 def collect(
     model: Model,

@@ -9,6 +9,7 @@ from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
 from contfric.atlas.matching import same_kind, same_location
+from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
 from contfric.continuation.events import End, EndReason, Kind, Verdict
@@ -41,6 +42,8 @@ def follow_departure(
     """Trace the branch that leaves a branch point or a period doubling; by default along the null vector."""
     settings = settings_for(orbit, state.settings)
     text = "the branch that leaves along the null vector"
+    if direction is None and leave_short(state, orbit, event, reason, text):
+        return
     for departure, distance, known in _departures(orbit, settings, reason, direction, state.known):
         if known is not None:
             state.judge(event, text, Verdict.KNOWN, known)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from contfric.atlas.collect import Event
 from contfric.atlas.matching import SAME_SOLUTION, identity, on_branch, same_event, stops_distance
@@ -126,6 +126,36 @@ class Exploration:
             self.judge(event, "go on after the event", Verdict.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
+
+    def end_at(self, index: int, k: int, event: Event) -> None:
+        """Let a branch end (its end k) at an event next to the one at which it was taken to end."""
+        branch = self.branches[index]
+        old = branch.ends[k].bifurcation
+        assert old is not None
+        new = replace(
+            event.bifurcation,
+            position=old.position,
+            stable_before=old.stable_before,
+            stable_after=old.stable_after,
+        )
+        ends = [*branch.ends]
+        ends[k] = replace(ends[k], bifurcation=new)
+        listed = tuple(new if b is old else b for b in branch.bifurcations)
+        self.branches[index] = replace(branch, bifurcations=listed, ends=(ends[0], ends[1]))
+        for other in [e for e in self.events if any(member is old for member in e.members)]:
+            other.members = [member for member in other.members if member is not old]
+            if not any(member is b for b in listed for member in other.members):
+                other.branches = [i for i in other.branches if i != index]
+                other.proposals = [p for p in other.proposals if p.branch != index]
+            if other.members and other.bifurcation is old:
+                other.bifurcation = other.members[0]
+            if not other.members:
+                self.events.remove(other)
+                if other in self.waiting:
+                    self.waiting.remove(other)
+        event.members.append(new)
+        if index not in event.branches:
+            event.branches.append(index)
 
     def merge(self, event: Event, end: End) -> None:
         """Make what a branch calls the end at an event a member of it, if it is an event of its own yet."""

@@ -19,6 +19,7 @@ from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
+from contfric.atlas.short_branches import begins_at_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
@@ -139,6 +140,8 @@ def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:
         _follow_all(state)
         if seeds is not None:
             _follow_seeds(state, orbit, seeds)
+        for event in tuple(state.events):
+            begins_at_short(state, event)
     except KeyboardInterrupt:
         state.complete = False
         state.notes.append(EndReason.INTERRUPTED.value)

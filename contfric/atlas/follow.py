@@ -12,8 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from contfric.atlas.collect import Event
 from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
@@ -26,9 +24,11 @@ from contfric.atlas.leaving_event import (
     from_admissible,
     leave_event,
     leave_singular,
+    may_have_passed,
     settings_for,
 )
 from contfric.atlas.matching import SAME_SOLUTION, on_branch, same_kind
+from contfric.atlas.short_branches import follow_short
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
@@ -38,7 +38,6 @@ from contfric.continuation.events import ACCURACY, TERMINAL, End, EndReason, Kin
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.points import Settings, next_to
-from contfric.continuation.switching import LEAVE
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
@@ -231,6 +230,8 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     if fault is not None and not _begins_continuum(state, candidate.orbit, event):
         state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)  # whatever is traced
         return False
+    if (met := follow_short(state, candidate, event)) is not None:
+        return met
     branch = leave_event(state, candidate, event)
     if branch is None and event.bifurcation.accuracy > ACCURACY:
         assert candidate.orbit is not None
@@ -270,9 +271,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
     state.accept(event, candidate.reason, branch)
     for end in ends:
         state.merge(event, end)
-        assert end.bifurcation is not None
-        if end.bifurcation.accuracy < event.bifurcation.accuracy:
-            event.bifurcation = end.bifurcation
+        event.take_better(end)
     return True
 
 
@@ -286,7 +285,7 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     known = event.bifurcation.accuracy
     outside = branch[0].margins.min(initial=0.0) < -_OUTSIDE
     elsewhere = (known > ACCURACY or outside) and not branch.bridge
-    passed = elsewhere or _may_have_passed(branch, known * state.settings.width)
+    passed = elsewhere or may_have_passed(branch, known * state.settings.width)
     if branch.arc[-1] < _NOWHERE_ROUGHLY or not passed:
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
@@ -297,21 +296,6 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     better = [end for end in ends if end.bifurcation and end.bifurcation.accuracy <= ACCURACY]
     located = better and not fault_of(whole, state.settings.width)
     return (whole, better[:1]) if located else (branch, [])
-
-
-def _may_have_passed(branch: Branch, known: float) -> bool:
-    """Tell whether a branch may have an event before the first point that was solved for away from its start.
-
-    As far as ``LEAVE`` a branch is a parabola. Farther a fold may be passed, and one is passed for certain
-    where the parameter goes back the way that it has come, by more than its value at the event is ``known``
-    to.
-    """
-    if branch.arc[1] > LEAVE:
-        return True
-    if len(branch) < 3 or any(0.0 < b.position <= branch.arc[2] for b in branch.bifurcations):
-        return False
-    moved = np.diff(branch.values[:3])
-    return bool(moved[0] * moved[1] < 0.0 and np.abs(moved).min() > known)
 
 
 def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> bool:

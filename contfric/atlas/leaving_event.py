@@ -19,7 +19,7 @@ from contfric.continuation.candidates import Candidate, directions
 from contfric.continuation.events import ACCURACY, Bifurcation, End, EndReason
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import NEARER, settings_value
+from contfric.continuation.switching import LEAVE, NEARER, settings_value
 from contfric.continuation.trace import trace_side
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
@@ -283,6 +283,21 @@ def _end_where_it_began(side: Side, there: Point, event: Event, settings: Settin
     before, after = (stable, None) if grows else (None, stable)
     here = replace(b, position=side.position, stable_before=before, stable_after=after)
     side.end = End(EndReason[b.kind.name], where(b, settings.parameter), here)
+
+
+def may_have_passed(branch: Branch, known: float) -> bool:
+    """Tell whether a branch may have an event before the first point that was solved for away from its start.
+
+    As far as ``LEAVE`` a branch is a parabola. Farther a fold may be passed, and one is passed for certain
+    where the parameter goes back the way that it has come, by more than its value at the event is ``known``
+    to.
+    """
+    if branch.arc[1] > LEAVE:
+        return True
+    if len(branch) < 3 or any(0.0 < b.position <= branch.arc[2] for b in branch.bifurcations):
+        return False
+    moved = np.diff(branch.values[:3])
+    return bool(moved[0] * moved[1] < 0.0 and np.abs(moved).min() > known)
 
 
 def side_is_bridge(side: Side) -> bool:

@@ -23,6 +23,7 @@ import numpy as np
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.degenerate import degenerate_events, unresolved
 from contfric.atlas.matching import identity, on_branch, same_location
+from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import ACCURACY, Bifurcation, EndReason
@@ -289,10 +290,10 @@ def _covers(known: Branch, branch: Branch) -> bool:
 def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:
     """Tell whether two branches of one itinerary have the same two ends, and no width that is known.
 
-    On these no value of the parameter is known to be a value of both.
+    On these no value of the parameter is known to be a value of both; nor are orbits solved on short ones.
     """
     width = diagram.range[1] - diagram.range[0]
-    if known.mirrored or not (unresolved(branch, width) and unresolved(known, width)):
+    if known.mirrored or not all(unresolved(b, width) or is_short(b) for b in (branch, known)):
         return False
     if known.system.half != branch.system.half or identity(known[0]) != identity(branch[0]):
         return False

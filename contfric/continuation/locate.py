@@ -9,6 +9,10 @@ from contfric.continuation.sliding import sliding_events
 from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
 from contfric.orbit.orbit import Orbit
 
+#: Events from which simpler orbits go on, and how much farther (in their accuracies) they are told from what
+#: is next to them.
+_OPENS, _TOLD = frozenset({Kind.BP, Kind.PD}), 10.0
+
 
 def locate_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings
@@ -37,13 +41,17 @@ def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings)
 
     Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a location
     along the branch is good to the root of what the parameter is. A vertex is no such fold: the simpler
-    orbits there have been solved.
+    orbits there have been solved. And where no multiplier is infinite a branch point or a doubling is known
+    well: with little damping it lies as near to a slide of no length as the damping is small.
     """
     if event.kind in TERMINAL:
         return False
     apart = abs(point.arc - end.arc)
+    gap = abs(point.value - end.value) / settings.width
+    if event.kind in _OPENS and gap > 0.0 and apart < SAME_LOCATION:
+        return gap <= _TOLD * event.accuracy
     if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_LOCATION):
         return True
     if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
         return False
-    return abs(point.value - end.value) < SAME_VALUE * settings.width and apart < SAME_FOLD
+    return gap < SAME_VALUE and apart < SAME_FOLD

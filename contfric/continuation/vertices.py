@@ -56,7 +56,7 @@ def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
     return None if part is None else solved_at_vertex(part, active)
 
 
-def undoubled(orbit: Orbit) -> Orbit | None:
+def undoubled(orbit: Orbit, farthest: float = NEARLY) -> Orbit | None:
     """Return the orbit of half the period that an orbit is near, not solved; None if far."""
     orbit = in_halves(orbit)
     system = orbit.system
@@ -65,7 +65,7 @@ def undoubled(orbit: Orbit) -> Orbit | None:
         return None
     image: FloatArray = orbit.joints[n:].copy()
     image[:, 0] -= 0.5 * orbit.period
-    if np.max(np.abs(image - orbit.joints[:n])) > NEARLY:
+    if np.max(np.abs(image - orbit.joints[:n])) > farthest:
         return None
     part = build_system(orbit.model, system.itinerary[:n], system.periods // 2)
     middle = 0.5 * (image + orbit.joints[:n])

@@ -15,7 +15,9 @@ Where the part of a chain between two holds folds by itself, its last joint has 
 border row knows of it. Such a pivot would be rounding, and so would be all that the border row is left with.
 The two rows change places: the border row is the pivot, with its parts on all later joints, and the row of
 the chain is carried along in its stead. The other rows of the chain, and the pencil, are those of the plain
-elimination.
+elimination. What is carried along may be the only pivot of another unknown (a slide of no length between two
+holds: the velocity at its end): then it comes back by the same exchange, with the share that it has of the
+border's parts on later joints.
 
 Nothing is stored but what the back substitution needs: the rows of a segment are written where they
 are eliminated. The columns are ``[z_0 | z_i | z_{i+1} | w | right-hand sides]``.
@@ -31,8 +33,9 @@ from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.vectors import subtract_eight
 from contfric.models.definition import FloatArray
 
-#: Share of a border row's entry below which all other pivots for it are rounding.
-_WEAK = 1e-14
+#: Share of an entry of the border row below which it is the pivot itself: above it that row keeps at least
+#: half of its digits. Whether other pivots are small or rounding need not be told.
+_WEAK = 1e-8
 
 
 class Elimination(NamedTuple):
@@ -46,8 +49,8 @@ class Elimination(NamedTuple):
     small, rhs : the system that is left, shapes (m + q, m + q) and (m + q, right)
     after : shape (m, right)
     z, w : solution, shapes (N, m, right) and (q, right)
-    exchanged : joint whose pivot is that of the border row, and which of its rows (-1: none); the share that
-        what is carried along in its stead has of the border's parts on later joints
+    shares : share of the border's parts on later joints that each kept row has, shape (N, m)
+    carried : how many rows have changed places with the border row; the share of what is carried along
     """
 
     rows: FloatArray
@@ -58,7 +61,8 @@ class Elimination(NamedTuple):
     after: FloatArray
     z: FloatArray
     w: FloatArray
-    exchanged: FloatArray
+    shares: FloatArray
+    carried: FloatArray
 
 
 @allocating_helper
@@ -74,7 +78,8 @@ def elimination_workspace(count, m, free, right):  # type: ignore[no-untyped-def
         np.empty((m, right)),
         np.empty((count, m, right)),
         np.empty((free, right)),
-        np.full(3, -1.0),
+        np.zeros((count, m)),
+        np.array([0.0, 1.0]),
     )
 
 
@@ -136,12 +141,12 @@ def subtract(target, row, source, j, factor, m, col):  # type: ignore[no-untyped
 
 
 @helper
-def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
-    """Take the columns m .. 2m out of the last m rows and of the border; False if singular.
+def eliminate_joint(rows, border, m, shares, i, carried):  # type: ignore[no-untyped-def]
+    """Take the columns of joint i, m .. 2m, out of the last m rows and of the border; False if singular.
 
-    Where the only border row is the pivot, its row and share are written to ``exchanged``.
+    Where the only border row is the pivot, the share of what is kept is written to ``shares``.
     """
-    free_to = border.shape[0] == 1 and exchanged[0] < 0
+    free_to = border.shape[0] == 1
     for j in range(m):
         col = m + j
         best, largest = j, abs(rows[j, col])
@@ -164,7 +169,8 @@ def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
                 rows[j, k], border[0, k] = border[0, k], rows[j, k]
             factor = border[0, col] / rows[j, col]
             subtract(border, 0, rows, j, factor, m, col)
-            exchanged[1], exchanged[2], free_to = j, -factor, False
+            shares[i, j] = carried[1]
+            carried[0], carried[1] = carried[0] + 1.0, -factor * carried[1]
             continue
         for row in range(border.shape[0]):
             factor = border[row, col] * scale
@@ -177,7 +183,11 @@ def eliminate_joint(rows, border, m, exchanged):  # type: ignore[no-untyped-def]
 def start_border(workspace, d, e, s, m):  # type: ignore[no-untyped-def]
     """Start the border rows: their parts on z_0, z_1, the parameters and the right-hand sides."""
     border, free, right = workspace.border, e.shape[0], s.shape[1]
-    workspace.exchanged[:] = -1
+    if workspace.carried[0] > 0.0:
+        for i in range(workspace.shares.shape[0]):
+            for j in range(m):
+                workspace.shares[i, j] = 0.0
+        workspace.carried[0], workspace.carried[1] = 0.0, 1.0
     for k in range(free):
         for j in range(m):
             border[k, j] = d[k, 0, j]
@@ -200,8 +210,7 @@ def next_rows(workspace, d, i, m):  # type: ignore[no-untyped-def]
             rows[row, 2 * m + k] = 0.0
         for k in range(3 * m, width):
             rows[row, k] = rows[m + row, k]
-    exchanged, count = workspace.exchanged, d.shape[1]
-    share = 1.0 if exchanged[0] < 0.0 else exchanged[2]
+    share, count = workspace.carried[1], d.shape[1]
     for row in range(border.shape[0]):
         for k in range(m):
             border[row, m + k] = border[row, 2 * m + k]
@@ -211,11 +220,9 @@ def next_rows(workspace, d, i, m):  # type: ignore[no-untyped-def]
 @helper
 def take_out(workspace, i, m):  # type: ignore[no-untyped-def]
     """Eliminate joint i and keep its rows; False if singular."""
-    rows, kept, exchanged = workspace.rows, workspace.kept, workspace.exchanged
-    if not eliminate_joint(rows, workspace.border, m, exchanged):
+    rows, kept = workspace.rows, workspace.kept
+    if not eliminate_joint(rows, workspace.border, m, workspace.shares, i, workspace.carried):
         return False
-    if exchanged[0] < 0.0 <= exchanged[1]:
-        exchanged[0] = i
     for j in range(m):
         for k in range(rows.shape[1]):
             kept[i, j, k] = rows[j, k]
@@ -281,7 +288,7 @@ def solve_ends(rows, border, close, close_w, small, rhs, z, w):  # type: ignore[
 def back_substitute(workspace, close, close_w, d):  # type: ignore[no-untyped-def]
     """Fill z_{N-1} .. z_1 from the kept rows; that of a border row has parts on all later joints."""
     kept, z, w, after = workspace.kept, workspace.z, workspace.w, workspace.after
-    joint, special = int(workspace.exchanged[0]), int(workspace.exchanged[1])
+    shares, exchanged = workspace.shares, workspace.carried[0] > 0.0
     count, m, right = z.shape
     free = w.shape[0]
     for i in range(m):
@@ -302,10 +309,10 @@ def back_substitute(workspace, close, close_w, d):  # type: ignore[no-untyped-de
                     value -= kept[i, j, 3 * m + n] * w[n, k]
                 for n in range(j + 1, m):
                     value -= kept[i, j, m + n] * z[i, n, k]
-                if i == joint and j == special:
+                if exchanged and shares[i, j] != 0.0:
                     for later in range(i + 2, count):
                         for n in range(m):
-                            value -= d[0, later, n] * z[later, n, k]
+                            value -= shares[i, j] * d[0, later, n] * z[later, n, k]
                 z[i, j, k] = value / kept[i, j, m + j]
         for j in range(m):
             for k in range(right):

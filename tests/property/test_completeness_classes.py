@@ -15,12 +15,9 @@ from report import Tally
 
 import contfric as cf
 from contfric.atlas.faults import fault_of
-from contfric.continuation import resolve
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
-from contfric.continuation.events import TERMINAL
-from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import ROUGH
 
 #: Scenes by what was wrong with them.
@@ -213,36 +210,35 @@ def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_
         assert any(w * width < o < w for w, o in zip(known, own, strict=True)), (known, own)
 
 
-def test_what_is_not_located_in_one_step_is_located_in_a_shorter_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Where a slide has exactly no length no trial may be solved: a branch ended just before its event."""
-    located, missed = resolve.locate_events, [0]
+def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> None:
+    """Next to a slide of no length a multiplier passes 1 at a distance in proportion to the damping.
 
-    def at_second_sight(
-        orbit: cf.Orbit, before: Point, after: Point, settings: Settings
-    ) -> list[tuple[cf.Bifurcation, Point]]:
-        found = located(orbit, before, after, settings)
-        if after.arc - before.arc < 1e-4 or not any(b.kind in TERMINAL for b, _ in found):
-            return found
-        missed[0] += 1
-        return []
+    What leaves the branch point there ends at once: it was refused, and with it a bridge and a branch over
+    half of the range that nothing else leads to. At the largest damping Newton's method solves for all of it.
+    """
+    found, lengths = restarts.scene(45, 7), []
+    rng = np.random.default_rng(0)
+    for damping in (1e-4, *10.0 ** rng.uniform(-8.5, -5.5, 2)):
+        orbit = cf.find_orbit("coulomb", {**found.params, "zeta": float(damping)}, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert len(explored.branches) == 13 and not explored.loose_ends, damping
+        (short,) = (b for b in explored.branches if b.arc[-1] < 1e-3 and not b.mirrored)
+        assert [end.reason.name for end in short.ends] == ["BP", "SS"]
+        assert all(o.admissible and o.converged and o.residual < 1e-12 for o in short), damping
+        assert explored.verify(restarts=2).passed, damping
+        lengths.append(float(short.arc[-1]) / damping)
+    assert np.ptp(lengths) < 0.02 * lengths[0], lengths
 
-    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
-    for friction in (0.32, 0.31, 0.33):
-        orbit = cf.find_orbit("coulomb", {**params, "S": friction})
-        plain = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends
-        with monkeypatch.context() as patch:
-            patch.setattr(resolve, "locate_events", at_second_sight)
-            closer = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends
-        assert [end.reason for end in closer] == [end.reason for end in plain]
-        for end, other in zip(closer, plain, strict=True):
-            assert end.bifurcation is not None and other.bifurcation is not None
-            gap = abs(end.bifurcation.params["Omega"] - other.bifurcation.params["Omega"])
-            assert gap < 1e-11
-    assert missed[0] >= 6
-    orbit = cf.find_orbit("coulomb", {**restarts.scene(42, 56).params, "zeta": 0.0}, longest=1000)
-    assert not cf.explore(orbit, "Omega", restarts.scene(42, 56).range).loose_ends
+
+@pytest.mark.slow
+def test_a_bridge_that_begins_where_a_short_branch_ends() -> None:
+    """What is held is negative between that end and the next event, by the square of 1e-8: it began there."""
+    found = restarts.scene(42, 56)
+    for damping in (1e-9, 7e-10, 3e-7):
+        orbit = cf.find_orbit("coulomb", {**found.params, "zeta": damping}, longest=1000)
+        explored = cf.explore(orbit, found.vary, found.range)
+        assert not explored.loose_ends and len(explored.branches) == 11, damping
+        assert explored.verify(restarts=4).passed, damping
 
 
 def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
