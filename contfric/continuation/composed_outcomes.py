@@ -125,19 +125,24 @@ def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
     """Return the mode after a surface, and the surface that leads back from there."""
     for other in model.targets.get((mode, surface), ()):
         for back, target in model.exits_of(other):
-            if target == mode:
+            if target == model.whole_mode(mode):
                 return other, back
     raise NotationError(f"{surface} does not bound '{mode}', or nothing leads back")
 
 
 def _vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where a state of a contact has no length any more: the contact does not change."""
-    itinerary, n = orbit.itinerary, len(orbit.itinerary)
+    itinerary, n, model = orbit.itinerary, len(orbit.itinerary), orbit.model
     for k in (i, (i + 1) % n):
         before, behind = (k - 1) % n, (k + 1) % n
-        if n > 2 and itinerary[before][0] == itinerary[behind][0] and not _lasts(orbit, k):
-            edit = Edit(frozenset({k, behind}), {before: itinerary[behind][1]})
-            return edit, {}, {}, f"segment {k + 1} vanishes"
+        modes = [itinerary[j][0] for j in (before, behind)]
+        if n < 3 or _lasts(orbit, k) or len(set(map(model.whole_mode, modes))) > 1:
+            continue
+        edit, joints = Edit(frozenset({k, behind}), {before: itinerary[behind][1]}), {}
+        if modes[0] != modes[1]:  # what ends on a section has the name of that side
+            edit = Edit(frozenset({before, k, behind}), {}, {before: (itinerary[behind],)})
+            joints = {(before, 0): orbit.cycle[before]}
+        return edit, joints, {}, f"segment {k + 1} vanishes"
     raise NotationError(f"segment {i + 1} ends tangentially, and what follows has some length")
 
 

@@ -20,6 +20,7 @@ from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
+from contfric.models.parts import MOST_SURFACES
 from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
 from contfric.models.sections import joined_modes
@@ -44,24 +45,16 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     ----------
     data : with the field of each mode in it
     """
-    if (
-        not description.period
-        or description.phase
-        or description.structure
-        or _has_many(description)
-    ):
+    if not description.period or description.phase:
         return {}
-    staying = [mode.name for mode in _staying(description)]
+    if description.structure:  # which modes it divides is told when they are visited
+        surfaces = len(description.surfaces)
+        return _phase_of(description, data) if surfaces < MOST_SURFACES else {}
+    staying = [] if _has_many(description) else [mode.name for mode in _staying(description)]
     if not staying:
         return {}
-    names = description.names
-    taken = {
-        *names.states,
-        *names.parameters,
-        *names.parts,
-        *(s.name for s in description.surfaces),
-    }
-    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
+    added = _phase_of(description, data)
+    name = added[KEY]
     modes: dict[str, Any] = {}
     parts: dict[str, tuple[str, ...]] = {}
     for mode, entry in data["modes"].items():
@@ -74,7 +67,6 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         parts[mode] = mode, other
         for part, side in (mode, "+"), (other, "-"):
             modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
-    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
     named = {
         key: {**entry, "in": {**(entry.get("in") or {}), name: "+"}}
         for key, entry in (data.get("domains") or {}).items()
@@ -86,10 +78,26 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     return {
         **({"domains": named} if named else {}),
         **({FORCES: forces} if forces else {}),
-        "observables": {**(data.get("observables") or {}), name: formula},
-        "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
+        **added,
         "modes": modes,
         "resets": named_parts(data.get("resets") or {}, parts),
+    }
+
+
+def _phase_of(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a model's data in which it has the phase as a surface."""
+    names = description.names
+    taken = {
+        *names.states,
+        *names.parameters,
+        *names.parts,
+        *(s.name for s in description.surfaces),
+    }
+    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
+    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
+    return {
+        "observables": {**(data.get("observables") or {}), name: formula},
+        "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         KEY: name,
     }
 
