@@ -29,12 +29,12 @@ class Parts(Made[str]):
     """A mapping of parts of modes to modes: there are some even before one is asked for."""
 
     def __init__(self, model: ComposedModel) -> None:
-        super().__init__(model.composition.whole, self._is_part)
+        super().__init__(model.composition.parts.whole, self._is_part)
         self._model = model
 
     def _is_part(self, name: object) -> bool:
         composition = self._model.composition
-        return composition.is_mode(name) and composition.is_divided(str(name))
+        return composition.is_mode(name) and composition.parts.is_divided(str(name))
 
     def __bool__(self) -> bool:
         return bool(self._model.phase)
@@ -163,9 +163,9 @@ class ComposedModel(Model):
 
     def domains_of(self, mode: str) -> tuple[Domain, ...]:
         """Return the domains of a mode: those of its parts, if the phase divides it."""
-        if not self.composition.is_divided(mode):
+        if not self.composition.parts.is_divided(mode):
             return (self.domain_by_name[mode],)
-        part = self.composition.part
+        part = self.composition.parts.part
         return tuple(self.domain_by_name[part(mode, side)] for side in (1, -1))
 
     @cached_property
@@ -175,13 +175,13 @@ class ComposedModel(Model):
 
     @cached_property
     def sections(self) -> Sections:  # type: ignore[override]
-        """Pairs (part of a mode, surface) that lead from one part to the other: where the phase divides it."""
+        """Pairs (part of a mode, surface) that lead from one part of a mode to the other."""
         return Sections(self)
 
     @cached_property
     def section_sides(self) -> dict[tuple[str, str], int]:
         """The side from which each section is crossed."""
-        return Made(lambda pair: self.composition.side(pair[0]), self.sections.__contains__)
+        return Made(lambda pair: self.composition.parts.side(pair[0]), self.sections.__contains__)
 
     def section_pair(self, mode: str, surface: str) -> tuple[str, str]:
         """Return (mode, surface) of a section: no other mode crosses it."""
@@ -191,16 +191,16 @@ class ComposedModel(Model):
         """Return (mode, surface) of a section that divides a mode, by the side from which it is crossed."""
         if (mode, surface) not in self.sections:
             return {}
-        return {side: (self.composition.part(mode, side), surface) for side in (1, -1)}
+        return {side: (self.composition.parts.part(mode, side), surface) for side in (1, -1)}
 
     def shown(self, domain: str) -> str:
         """Return the domain that stands for one in labels: the first part of its mode."""
-        return self.composition.whole(domain) if domain in self.joined else domain
+        return self.composition.parts.whole(domain) if domain in self.joined else domain
 
     @property
-    def phase_parts(self) -> frozenset[str]:  # type: ignore[override]
+    def phase_parts(self) -> frozenset[str]:
         """The second parts of modes that were visited."""
-        return frozenset(m.name for m in self.modes if self.composition.side(m.name) < 0)
+        return frozenset(m.name for m in self.modes if self.composition.parts.side(m.name) < 0)
 
     # ------------------------------------------------------------------------------ transitions
 
@@ -231,7 +231,7 @@ class ComposedModel(Model):
 
     def _beyond(self, part: str) -> str:
         """Return the other part of a mode that the phase divides."""
-        return self.composition.part(part, -self.composition.side(part))
+        return self.composition.parts.part(part, -self.composition.parts.side(part))
 
     def _leads(self, key: Any) -> bool:
         name, surface = key
@@ -293,7 +293,9 @@ class ComposedModel(Model):
         view = self.view(vector)
         height = view.height(self.phase, t, y)
         seen = self.surface_by_name[self.phase].observable
-        return self.composition.part(mode, 1 if (height or view.rate(mode, seen, t, y)) > 0.0 else -1)
+        return self.composition.parts.part(
+            mode, 1 if (height or view.rate(mode, seen, t, y)) > 0.0 else -1
+        )
 
     @cached_property
     def mirror_domain(self) -> dict[str, str]:
@@ -305,8 +307,12 @@ class ComposedModel(Model):
     def _image(self, name: str) -> str:
         assert self.symmetry is not None
         whole = self.composition.image(name, self.symmetry.surfaces)
-        side = self.composition.side(name)
-        return self.composition.part(whole, side * self.symmetry.sense(self.phase)) if side else whole
+        side = self.composition.parts.side(name)
+        return (
+            self.composition.parts.part(whole, side * self.symmetry.sense(self.phase))
+            if side
+            else whole
+        )
 
     # ------------------------------------------------------------------------------------- flow
 

@@ -33,15 +33,13 @@ from contfric.models.description import ModeText
 from contfric.models.entries import SIDES, Part
 from contfric.models.made import Made
 from contfric.models.parts import Domain, Mode, Surface
+from contfric.models.phase_parts import PART, PhaseParts
 from contfric.models.shared_loads import Limit, Setting, load_name, suffix
 from contfric.models.shared_ways import Place, SharedWays
 from contfric.models.structure import Structure
 
 if TYPE_CHECKING:
     from contfric.models.description import Description
-
-#: What the name of the second part of a mode ends with.
-PART = "-"
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,8 @@ class Composition:
 
     Attributes
     ----------
-    phase : the surface of the phase that divides modes in which an orbit may stay; empty without one
+    phase : the surface of the phase; empty if no mode is divided
+    parts : which modes it divides
     """
 
     def __init__(self, description: Description) -> None:
@@ -74,8 +73,8 @@ class Composition:
         self._places: dict[str, int] = {}
         self._ways: dict[str, dict[str, tuple[Way, ...]]] = {}
         self._limits: dict[str, Limit | None] = {}
-        self._divided: dict[str, bool] = {}
         self.declared = frozenset(s.name for s in description.surfaces)
+        self.parts = PhaseParts(self.acting, len(self.structure.coordinates), description.phase)
         self.phase = description.phase
         self.shared = SharedWays(structure, description)
 
@@ -85,16 +84,16 @@ class Composition:
             return True
         if not isinstance(name, str):
             return False
-        whole = self.whole(name)
+        whole = self.parts.whole(name)
         fits = len(whole) == len(self.acting)
         fits = fits and all(a in c.states for a, c in zip(whole, self.acting, strict=True))
-        return fits and (whole == name or self.is_divided(whole))
+        return fits and (whole == name or self.parts.is_divided(whole))
 
     def order(self, name: str) -> int:
         """Return the place of a mode among all, if they were listed: second parts come last."""
         if name not in self._places:
             place = 0
-            for letter, contact in zip(self.whole(name), self.acting, strict=True):
+            for letter, contact in zip(self.parts.whole(name), self.acting, strict=True):
                 place = place * len(contact.states) + contact.states.index(letter)
             count = math.prod(len(c.states) for c in self.acting)
             self._places[name] = place + count * name.endswith(PART)
@@ -102,46 +101,9 @@ class Composition:
 
     def states_in(self, name: str) -> dict[str, str]:
         """Return the state of each contact."""
-        return {c.name: letter for c, letter in zip(self.acting, self.whole(name), strict=True)}
-
-    # ---------------------------------------------------------------------- parts of modes
-
-    def whole(self, name: str) -> str:
-        """Return the mode that a mode is a part of, most often itself."""
-        return name.removesuffix(PART)
-
-    def is_divided(self, name: str) -> bool:
-        """Tell whether the phase divides a mode: one in which an orbit may stay (:mod:`..phases`)."""
-        whole = self.whole(name)
-        if whole not in self._divided:
-            self._divided[whole] = bool(self.phase) and self._may_stay(whole)
-        return self._divided[whole]
-
-    def _may_stay(self, whole: str) -> bool:
-        """Tell whether something moves in a mode, and no contact slides to one side for ever.
-
-        Where the velocity of a contact is that of masses alone, what slides in one direction goes away.
-        """
-        states = self.states_in(whole)
-        held = sum(
-            states[c.name] == "s" for c in self.acting if c.kind is ContactKind.FRICTION
-        )
-        if held == len(self.structure.coordinates):
-            return False
-        return not any(
-            states[c.name] in ("p", "n")
-            and (c.kind is ContactKind.JENKINS or not _is_carried(c))
-            for c in self.acting
-        )
-
-    def part(self, name: str, side: int) -> str:
-        """Return the part of a mode on one side of the phase; the mode itself if that is not divided."""
-        whole = self.whole(name)
-        return whole + PART if side < 0 and self.is_divided(whole) else whole
-
-    def side(self, name: str) -> int:
-        """Return the side of the phase that a part of a mode lies on; 0 of a mode that is not divided."""
-        return (-1 if name.endswith(PART) else 1) * self.is_divided(name)
+        return {
+            c.name: letter for c, letter in zip(self.acting, self.parts.whole(name), strict=True)
+        }
 
     def sides(self, name: str) -> dict[str, int]:
         """Return the sides of the surfaces that matter to a mode."""
@@ -157,10 +119,10 @@ class Composition:
 
     def domain(self, name: str) -> Domain:
         """Return the only domain of a mode, with the sides of the surfaces that matter to it."""
-        if not self.is_divided(name):
+        if not self.parts.is_divided(name):
             return Domain(name, name, self.sides(name), name)
-        sides = {**self.sides(name), self.phase: self.side(name)}
-        return Domain(name, self.whole(name), sides, name, declared=name)
+        sides = {**self.sides(name), self.phase: self.parts.side(name)}
+        return Domain(name, self.parts.whole(name), sides, name, declared=name)
 
     def text(self, name: str) -> ModeText:
         """Return the rates in a mode, and its sides; shared loads have names (:meth:`loads_in`)."""
@@ -374,7 +336,7 @@ class Composition:
         place : parameters, time and state, for contacts at rest that share loads
         """
         whole = self._mode_at(signs, place)
-        return self.part(whole, signs.get(self.phase, 1))
+        return self.parts.part(whole, signs.get(self.phase, 1))
 
     def _mode_at(self, signs: Mapping[str, int], place: Place | None) -> str:
         states: dict[str, str] = {}
@@ -426,11 +388,6 @@ class Composition:
         states = {images[c.name]: turned.get(letter, letter) for c, letter in limit.setting}
         setting = tuple((c, states[c.name]) for c in self.acting if c.name in states)
         return Limit(by_name[images[limit.contact.name]], turned[limit.sign], setting)
-
-
-def _is_carried(contact: Contact) -> bool:
-    """Tell whether the velocity of a contact has a given part, as that of a belt."""
-    return any(kind != "y" for kind, _ in contact.form.parts)
 
 
 @lru_cache(maxsize=16)

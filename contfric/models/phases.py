@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.description import Description, ModeText
@@ -25,6 +26,9 @@ from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
 from contfric.models.sections import joined_modes
 
+if TYPE_CHECKING:
+    from contfric.models.definition import Model
+
 #: The key of what has been divided, and the name of the observable and the surface.
 KEY = "phase"
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
@@ -33,24 +37,50 @@ _SAME = 1e-9
 _POINTS = 8
 #: Where in a period: at no time at which solutions start, forces are largest, or simulations end.
 _LATE = 1
-#: The phase doubles the regions of a model: many contacts with friction have thousands already. Two friction
-#: contacts and a gap have 98, six gaps 64; with more modes than these regions are not even listed.
-_MOST_REGIONS = 128
+#: The phase doubles the regions of a model, which takes time where they are many: three friction contacts
+#: have 343, six gaps 64, four friction contacts 2401 (two seconds more to load). Models with more are divided
+#: once a solution stays in a mode for ever (:func:`with_phase`).
+_MOST_REGIONS = 343
+#: Models that are kept with their phase.
+_MODELS = 16
 
 
-def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
+def with_phase(model: Model) -> Model | None:
+    """Return a model whose modes the phase divides, however many its regions are; None if none has to be."""
+    if not model.definition or model.phase:
+        return None
+    return _with_phase(model.definition)
+
+
+@lru_cache(maxsize=_MODELS)
+def _with_phase(definition: str) -> Model | None:
+    from contfric.models.derive import model_from
+    from contfric.models.describe import describe, from_text
+
+    description = from_text(definition)
+    data = description.data()
+    parts = phase_parts(description, data, however_many=True)
+    return model_from(describe({**data, **parts})) if parts else None
+
+
+def phase_parts(
+    description: Description, data: Mapping[str, Any], however_many: bool = False
+) -> dict[str, Any]:
     """Return the parts of a model's data in which its modes are divided; none where none has to be.
 
     Parameters
     ----------
     data : with the field of each mode in it
+    however_many : even if its regions are many
     """
     if not description.period or description.phase:
         return {}
     if description.structure:  # which modes it divides is told when they are visited
         surfaces = len(description.surfaces)
         return _phase_of(description, data) if surfaces < MOST_SURFACES else {}
-    staying = [] if _has_many(description) else [mode.name for mode in _staying(description)]
+    if not however_many and _has_many(description):
+        return {}
+    staying = [mode.name for mode in _staying(description)]
     if not staying:
         return {}
     added = _phase_of(description, data)
