@@ -138,7 +138,7 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
     orbit, away = _without_sections(orbit, away)
     if not np.any(away):
         return Candidate(reason, orbit, itineraries=itineraries)
-    return Candidate(reason, orbit, away=_along_motion(orbit, away), itineraries=itineraries)
+    return Candidate(reason, orbit, away=along_motion(orbit, away), itineraries=itineraries)
 
 
 def _without_sections(orbit: Orbit, away: FloatArray) -> tuple[Orbit, FloatArray]:
@@ -185,10 +185,10 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
         edited, moves = replace(edited, system=part, joints=joints), moves[: len(half)]
     if not np.any(moves):
         return edited, None
-    return edited, _along_motion(edited, moves)
+    return edited, along_motion(edited, moves)
 
 
-def _along_motion(orbit: Orbit, away: FloatArray) -> FloatArray:
+def along_motion(orbit: Orbit, away: FloatArray) -> FloatArray:
     """Return how joints move, states with times: where one part rests others go on, and a belt with it.
 
     What comes in has no length, and begins with the rate of the solution.

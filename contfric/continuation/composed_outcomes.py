@@ -57,7 +57,7 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
         return _two_at_once(orbit, i, location.surface)
     if location.margin is Margin.INTERIOR:
         return _touched(orbit, i, location.surface)
-    return _vanished(orbit, i)
+    return vanished(orbit, i)
 
 
 def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
@@ -130,8 +130,11 @@ def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
     raise NotationError(f"{surface} does not bound '{mode}', or nothing leads back")
 
 
-def _vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
-    """Return the edit where a state of a contact has no length any more: the contact does not change."""
+def vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where a segment between two of one mode has no length any more: it is left out.
+
+    So it is with a state of a contact, and beyond a surface that is crossed there and back.
+    """
     itinerary, n, model = orbit.itinerary, len(orbit.itinerary), orbit.model
     for k in (i, (i + 1) % n):
         before, behind = (k - 1) % n, (k + 1) % n
