@@ -95,15 +95,16 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         state.judge(event, reason, Verdict.REFUSED, why=why)
         return
     active = orbit.model.index_of(state.settings.parameter)
-    crossed = is_crossed(event.bifurcation)
-    edits = crossed or bool(orbit.model.resets) or any(m.sliding for m in orbit.model.modes)
+    edits = bool(orbit.model.resets) or any(
+        mode.sliding for mode in orbit.model.modes
+    )  # else nothing rests
     # the forms are the same both times where the event is known roughly; what else the second time tries is
     # what local conditions exclude, and these are not asked of many contacts
     once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
     tried: set[tuple[object, ...]] = set()  # by what an orbit is solved from: it ends the same
-    most, copies = state.max_periods, state.copies
-    for candidate in partial_touches(event.bifurcation, most, copies) if crossed else ():
-        _judge(state, event, candidate)  # what follows over one period is another question
+    if is_crossed(event.bifurcation):
+        for candidate in partial_touches(event.bifurcation, state.max_periods, state.copies):
+            _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
         itineraries: set[Itinerary] = set()

@@ -1,90 +1,190 @@
-"""Orbits of several periods that cross a surface in some of them only, where an orbit of one touches it.
+"""Orbits that cross a surface in some of their periods only, where a solution touches it.
 
-A mass between a free flight and a preloaded stop is smooth on the one side of a grazing, so that it may have
-no joint there: the two forms of a period cannot be put one after the other. But over m periods the form that
-crosses has m passages of no length, and any of them may be left out, if not all.
+At a switch of the force, or a preloaded stop, nothing rests and nothing is reset: beyond the event motion
+crosses the surface and comes back. The solution at the event with a passage of no length at each of its
+touches, over m periods, has those forms in which any of these are left out, if not all: without any it may
+have no joint (it is smooth then, and is found by a simulation).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from contfric.continuation.candidates import Candidate, along_motion
 from contfric.continuation.events import Bifurcation
-from contfric.continuation.incident import Form, Incident, edited_whole, incident_forms
-from contfric.continuation.outcomes import Outcome
-from contfric.continuation.sequences import MOST_SEQUENCES, count, necklaces
-from contfric.continuation.touching import crossed_at, speeds_of_crossing
+from contfric.continuation.incident import edited_whole, vanishing
+from contfric.continuation.outcomes import Outcome, outcome_at
+from contfric.continuation.touching import coming_back, crossed_at, speeds_of_crossing
+from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
-from contfric.orbit.orbit import Orbit
+from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
+from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.sections import canonical, is_smooth
 from contfric.orbit.slides import SHORT, time_unit
-from contfric.orbit.system import EventFunction, Margin
+from contfric.orbit.system import EventFunction, Margin, build_system
 from contfric.signature.edits import Edit
+
+#: Most touches over all periods of an orbit of which any are left out: 2^8 combinations, up to rotation.
+_MOST_TOUCHES = 8
+#: Margins below count as zero, as at any event that is well located.
+_LEAST = 1e-6
+#: Joints this near to the end of a period (as a share of it) are those of the next one.
+_NEXT = 1e-6
 
 
 def is_crossed(bifurcation: Bifurcation) -> bool:
     """Tell whether an event is the touch of a surface that is crossed beyond it."""
     whole = bifurcation.orbit.as_whole()
-    return any(crossed_at(whole, test) for test in bifurcation.tests)
+    return all(crossed_at(whole, test) for test in bifurcation.tests)
 
 
 def partial_touches(
     bifurcation: Bifurcation, most_periods: int, copies: int
 ) -> Iterator[Candidate]:
-    """Yield orbits of several periods in which a surface that an orbit touches is crossed in some of them.
+    """Yield orbits of one or more periods in which a surface that an orbit touches is crossed.
 
     Parameters
     ----------
-    most_periods, copies : longest orbits, in periods, and in copies of the one at the event
+    most_periods, copies : longest orbits, in periods, and in copies of the solution at the event
     """
-    incident = incident_forms(bifurcation)
-    if len(incident.forms) != 1 or incident.unit.half:
+    if bifurcation.orbit.model.autonomous:
         return
-    (form,) = incident.forms
-    for length in range(2, min(copies, most_periods // incident.unit.periods) + 1):
-        if count(2, length) > MOST_SEQUENCES:
+    periods = bifurcation.outline.periods
+    try:
+        unit = _with_all_touches(bifurcation.orbit.as_whole(), periods)
+    except NotationError as error:
+        yield Candidate("a passage at each touch", None, str(error))
+        return
+    touches = len(_passages(unit))
+    for length in range(1, min(copies, most_periods // periods) + 1):
+        if touches * length > _MOST_TOUCHES:
             return
-        for kept in necklaces(2, length):
-            if 0 < sum(kept) < length:
-                reason = f"crossed in {sum(kept)} of {length} periods"
-                yield from _candidate(incident, form, kept, reason)
+        orbit = _repeated(unit, length)
+        for kept in _choices(touches, length):
+            yield _candidate(orbit, kept, f"{sum(kept)} of {touches * length} touches crossed")
 
 
-def _candidate(
-    incident: Incident, form: Form, kept: tuple[int, ...], reason: str
-) -> Iterator[Candidate]:
-    orbit, _ = incident.unit.orbit((form,) * len(kept))
-    whole = orbit.as_whole()
-    passages = _passages(whole)
-    if len(passages) != len(kept):
-        return
-    n, away, dropped = len(whole.itinerary), np.zeros(len(whole.itinerary)), set()
-    for k, stays in zip(passages, kept, strict=True):
+def _choices(touches: int, length: int) -> Iterator[tuple[int, ...]]:
+    """Yield which touches are crossed: not none, up to rotation by a period, and nothing that repeats itself.
+
+    Examples
+    --------
+    >>> list(_choices(1, 2)), list(_choices(1, 1))
+    ([(0, 1)], [(1,)])
+    """
+    for kept in product((0, 1), repeat=touches * length):
+        turned = [kept[k * touches :] + kept[: k * touches] for k in range(1, length)]
+        if any(kept) and all(kept < other for other in turned):
+            yield kept
+
+
+def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str) -> Candidate:
+    n = len(orbit.itinerary)
+    away, dropped = np.zeros(n), set()
+    for k, stays in zip(_passages(orbit), kept, strict=True):
         if stays:
-            away[k], away[(k + 1) % n] = speeds_of_crossing(whole, k)
+            away[k], away[(k + 1) % n] = speeds_of_crossing(orbit, k)
         else:
             dropped |= {k, (k + 1) % n}
     try:
-        edited, moves = edited_whole(whole, [Outcome(Edit(frozenset(dropped)), {}, reason)], away)
+        edited, moves = edited_whole(orbit, [Outcome(Edit(frozenset(dropped)), {}, reason)], away)
     except NotationError as error:
-        yield Candidate(reason, None, str(error))
-        return
-    yield Candidate(
-        reason, edited, away=along_motion(edited, moves), itineraries=frozenset({edited.itinerary})
-    )
+        return Candidate(reason, None, str(error))
+    itineraries = frozenset({edited.itinerary})
+    return Candidate(reason, edited, away=along_motion(edited, moves), itineraries=itineraries)
 
 
 def _passages(whole: Orbit) -> list[int]:
     """Return the segments of no length beyond a surface that is crossed there and back."""
-    lasts, n = whole.ends[:, 0] - whole.begins[:, 0], len(whole.itinerary)
-    model, found = whole.model, []
+    lasts, n, model = whole.ends[:, 0] - whole.begins[:, 0], len(whole.itinerary), whole.model
+    found = []
     for k, (_, surface) in enumerate(whole.itinerary):
         before, behind = whole.itinerary[k - 1], whole.itinerary[(k + 1) % n]
         same = model.whole_mode(before[0]) == model.whole_mode(behind[0])
-        touch = EventFunction(Margin.EXIT, k, surface)
         short = lasts[k] < SHORT * time_unit(whole)
+        touch = EventFunction(Margin.EXIT, k, surface)
         if same and short and before[1] == surface and crossed_at(whole, touch):
             found.append(k)
     return found
+
+
+def _with_all_touches(whole: Orbit, periods: int) -> Orbit:
+    """Return the solution at an event over its shortest period, with a passage at each touch.
+
+    Raises
+    ------
+    NotationError
+        If there is no such itinerary.
+    """
+    if is_smooth(whole.model, whole.itinerary):
+        whole = _of_smooth(whole)
+    passages = _passages(whole)
+    if not passages:
+        outcomes = [outcome_at(whole, *location) for location in vanishing(whole, _LEAST)]
+        if not outcomes:
+            raise NotationError("no touch is left at the event")
+        whole = canonical(edited_whole(whole, outcomes)[0])
+        passages = _passages(whole)
+    if not passages:
+        raise NotationError("what crosses the surface at the event does not come back")
+    first, n = passages[0], len(whole.itinerary)
+    order = [(first + j) % n for j in range(n)]
+    joints = whole.begins[order].copy()
+    joints[:, 0] += whole.period * (np.arange(n) >= n - first)
+    length = whole.period * periods / whole.periods
+    inside = int(np.sum(joints[:, 0] < joints[0, 0] + length * (1.0 - _NEXT)))
+    pairs = [whole.itinerary[k] for k in order[:inside]]
+    pairs[-1] = pairs[-1][0], whole.itinerary[first][1]  # it ends where the touch comes again
+    return _as_orbit(whole, pairs, joints[:inside], periods)
+
+
+def _of_smooth(whole: Orbit) -> Orbit:
+    """Return a smooth solution with joints where it touches surfaces, twice each, and at no section."""
+    model, n = whole.model, len(whole.itinerary)
+    found: dict[float, tuple[FloatArray, str, str]] = {}
+    for location, _ in vanishing(whole, _LEAST):
+        if not crossed_at(whole, location):
+            continue
+        i, surface = location.segment, location.surface
+        at_joint = location.margin is Margin.JOINT
+        touch = whole.ends[i] if at_joint else touch_of(whole, i, surface)
+        beyond = coming_back(whole, whole.itinerary[i][0], surface, touch)
+        if beyond is None:
+            raise NotationError(f"what passes {surface} at the event does not come back from there")
+        turn = whole.period * np.floor((touch[0] - whole.begins[0, 0]) / whole.period)
+        touch = touch - turn * np.eye(1, len(touch))[0]
+        found[float(touch[0])] = touch, surface, beyond.mode
+    if not found:
+        raise NotationError("no touch is left at the event")
+    mode = model.whole_mode(whole.itinerary[n - 1][0])
+    touches = [found[time] for time in sorted(found)]
+    ends = [surface for _, surface, _ in (*touches[1:], touches[0])]
+    pairs: list[tuple[str, str]] = []
+    for (_, surface, beyond), end in zip(touches, ends, strict=True):
+        pairs += [(beyond, surface), (mode, end)]
+    joints = np.repeat(np.array([touch for touch, *_ in touches]), 2, axis=0)
+    return _as_orbit(whole, pairs, joints, whole.periods)
+
+
+def _repeated(unit: Orbit, length: int) -> Orbit:
+    """Return some periods of a whole orbit, one after the other, as one orbit."""
+    joints = np.concatenate([unit.cycle] * length)
+    joints[:, 0] += np.repeat(np.arange(length) * unit.period, len(unit.cycle))
+    return _as_orbit(unit, list(unit.itinerary) * length, joints, unit.periods * length)
+
+
+def _as_orbit(
+    orbit: Orbit, itinerary: list[tuple[str, str]], joints: FloatArray, periods: int
+) -> Orbit:
+    end = float(joints[0, 0]) + orbit.period * periods / orbit.periods
+    try:
+        system = build_system(orbit.model, tuple(itinerary), periods)
+    except ValueError as error:
+        raise NotationError(str(error)) from None
+    joints = clocked(orbit.model, joints, end)
+    return replace(orbit, system=system, joints=joints, status=Status.CONVERGED)

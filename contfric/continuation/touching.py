@@ -250,7 +250,10 @@ def crossed_at(orbit: Orbit, test: EventFunction) -> bool:
     So it is at a preloaded stop, or a switch of the force.
     """
     model, (mode, exit_) = orbit.model, orbit.itinerary[test.segment]
-    if model.composed or test.margin not in (Margin.INTERIOR, Margin.EXIT) or is_hold(exit_):
+    at_section = test.margin is Margin.JOINT and (mode, exit_) in model.sections
+    if model.composed or is_hold(exit_):
+        return False
+    if not at_section and test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return False
     if model.rests_on(test.surface) or test.surface in model.reset_by_surface:
         return False

@@ -377,9 +377,9 @@ def test_a_datum_off_the_centre_is_kept_until_its_contact_creeps() -> None:
     first = float(1.0 / np.max(transfer(model, 6)))
     state = np.zeros(len(model.states))
     state[5] = 0.1
-    orbit = cf.find_orbit(model, {"F": 0.5 * first}, state=state)
+    orbit = cf.find_orbit(model, {"F": 0.2 * first}, state=state)
     assert len(orbit.system.layout.conserved) == 6
-    branch, *_ = cf.explore(orbit, "F", (0.3 * first, first), max_periods=1).branches
+    branch, *_ = cf.explore(orbit, "F", (0.1 * first, first), max_periods=1).branches
     assert {end.reason.name for end in branch.ends} == {"RANGE", "SHAKEDOWN"}
     for k in range(0, len(branch), 10):
         assert branch[k].joints[:, 6] == pytest.approx(0.1, abs=1e-12)
