@@ -103,7 +103,8 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
     tried: set[tuple[object, ...]] = set()  # by what an orbit is solved from: it ends the same
     if is_crossed(event.bifurcation):
-        for candidate in partial_touches(event.bifurcation, state.max_periods, state.copies):
+        most, copies = state.max_periods, state.copies
+        for candidate in partial_touches(event.bifurcation, active, most, copies):
             _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)

@@ -43,6 +43,7 @@ class Candidate:
     away : how its joints move where it is singular at the event and has to start near it; else None
     rest : whether that is because nothing moves any more
     itineraries : of the units that it consists of
+    share : how the parameter moves with the joints, where that is known
     """
 
     reason: str
@@ -51,6 +52,7 @@ class Candidate:
     away: FloatArray | None = None
     rest: bool = False
     itineraries: frozenset[Itinerary] = frozenset()
+    share: float = 0.0
 
     @property
     def has_hold(self) -> bool:

@@ -17,6 +17,7 @@ import numpy as np
 from contfric.continuation.candidates import Candidate, along_motion
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.incident import edited_whole, vanishing
+from contfric.continuation.leaving_touch import Leaving, leaving
 from contfric.continuation.outcomes import Outcome, outcome_at
 from contfric.continuation.touching import coming_back, crossed_at, speeds_of_crossing
 from contfric.continuation.zero_acceleration import touch_of
@@ -44,12 +45,13 @@ def is_crossed(bifurcation: Bifurcation) -> bool:
 
 
 def partial_touches(
-    bifurcation: Bifurcation, most_periods: int, copies: int
+    bifurcation: Bifurcation, active: int, most_periods: int, copies: int
 ) -> Iterator[Candidate]:
     """Yield orbits of one or more periods in which a surface that an orbit touches is crossed.
 
     Parameters
     ----------
+    active : index of the parameter that varies
     most_periods, copies : longest orbits, in periods, and in copies of the solution at the event
     """
     if bifurcation.orbit.model.autonomous:
@@ -66,7 +68,9 @@ def partial_touches(
             return
         orbit = _repeated(unit, length)
         for kept in _choices(touches, length):
-            yield _candidate(orbit, kept, f"{sum(kept)} of {touches * length} touches crossed")
+            reason = f"{sum(kept)} of {touches * length} touches crossed"
+            way = leaving(unit, kept, active) if len(unit.itinerary) == 2 else None
+            yield _candidate(orbit, kept, reason, way)
 
 
 def _choices(touches: int, length: int) -> Iterator[tuple[int, ...]]:
@@ -83,7 +87,9 @@ def _choices(touches: int, length: int) -> Iterator[tuple[int, ...]]:
             yield kept
 
 
-def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str) -> Candidate:
+def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str, way: Leaving | None) -> Candidate:
+    if way is not None and way.why:
+        return Candidate(reason, None, way.why)
     n = len(orbit.itinerary)
     away, dropped = np.zeros(n), set()
     for k, stays in zip(_passages(orbit), kept, strict=True):
@@ -96,6 +102,8 @@ def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str) -> Candidate:
     except NotationError as error:
         return Candidate(reason, None, str(error))
     itineraries = frozenset({edited.itinerary})
+    if way is not None:
+        return Candidate(reason, edited, "", way.joints, itineraries=itineraries, share=way.share)
     return Candidate(reason, edited, away=along_motion(edited, moves), itineraries=itineraries)
 
 
@@ -165,8 +173,8 @@ def _of_smooth(whole: Orbit) -> Orbit:
     touches = [found[time] for time in sorted(found)]
     ends = [surface for _, surface, _ in (*touches[1:], touches[0])]
     pairs: list[tuple[str, str]] = []
-    for (_, surface, beyond), end in zip(touches, ends, strict=True):
-        pairs += [(beyond, surface), (mode, end)]
+    for (_, surface, other), end in zip(touches, ends, strict=True):
+        pairs += [(other, surface), (mode, end)]
     joints = np.repeat(np.array([touch for touch, *_ in touches]), 2, axis=0)
     return _as_orbit(whole, pairs, joints, whole.periods)
 

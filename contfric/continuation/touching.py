@@ -255,7 +255,8 @@ def crossed_at(orbit: Orbit, test: EventFunction) -> bool:
         return False
     if not at_section and test.margin not in (Margin.INTERIOR, Margin.EXIT):
         return False
-    if model.rests_on(test.surface) or test.surface in model.reset_by_surface:
+    rests = model.rests_on(test.surface) or model.mode_by_name[model.whole_mode(mode)].sliding
+    if rests or test.surface in model.reset_by_surface:
         return False
     whole = model.whole_mode(mode)
     return any(

@@ -331,7 +331,12 @@ def many(seed: int, contacts: int, static: float = 1.0) -> cf.Model:
         0.05 * stiffness,
         stiffness,
         contacts={
-            f"c{i}": {"kind": "friction", "velocity": f"v{i}", "kinetic": "S", "static": f"{static!r}*S"}
+            f"c{i}": {
+                "kind": "friction",
+                "velocity": f"v{i}",
+                "kinetic": "S",
+                "static": f"{static!r}*S",
+            }
             for i in range(1, contacts + 1)
         },
         force={f"q{n}": "F*cos(w*t)"},
@@ -357,7 +362,7 @@ def transfer(model: cf.Model, contacts: int) -> np.ndarray:
 def test_many_contacts_that_never_slip_are_followed_until_one_does(
     seed: int, contacts: int
 ) -> None:
-    """The first slips where the largest of the forces on them, of the linear system, is S; from both sides."""
+    """The first slips where the largest of the forces on them, of the linear system, is S."""
     model = many(seed, contacts)
     first = float(1.0 / np.max(transfer(model, contacts)))
     orbit = cf.find_orbit(model, {"F": 0.2 * first}, state=np.zeros(len(model.states)))
@@ -372,7 +377,7 @@ def test_many_contacts_that_never_slip_are_followed_until_one_does(
 
 
 def test_a_datum_off_the_centre_is_kept_until_its_contact_creeps() -> None:
-    """Six contacts, of which the last rests where its springs pull: it reaches its limit on one side first."""
+    """Six contacts: the last rests where its springs pull, and reaches its limit on one side."""
     model = many(9, 6)
     first = float(1.0 / np.max(transfer(model, 6)))
     state = np.zeros(len(model.states))
