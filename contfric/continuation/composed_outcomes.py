@@ -23,6 +23,7 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 from __future__ import annotations
 
 from contfric.continuation.shared_outcomes import in_other_order, limit_after, with_other_state
+from contfric.continuation.touching import coming_back, second_rate
 from contfric.continuation.zero_acceleration import only_comes_back, touch_of
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
@@ -51,6 +52,8 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
         If nothing follows from this location: the reason says why.
     """
     itinerary, i = orbit.itinerary, location.segment
+    if not orbit.model.composed:
+        return _crossed(orbit, location)
     if is_hold(itinerary[i][1]):
         raise NotationError(f"segment {i + 1} is a hold: nothing can be held where nothing jumps")
     if location.margin is Margin.JOINT:
@@ -119,6 +122,30 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
         lasts = (-1.0, 2.0) if model.rests_on(back) else (-1.0, 0.0)
     speeds = {(i, 0): lasts[0], (i, 1): lasts[1]}
     return edit, joints, speeds, f"{surface} is touched in segment {i + 1}: passed, and met again"
+
+
+def _crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit at the touch of a surface that is crossed: the time beyond it begins, or vanishes.
+
+    How fast the joints move apart: :func:`~contfric.continuation.touching.speeds_of_crossing`.
+    """
+    i, surface = location.segment, location.surface
+    if location.margin is Margin.JOINT:
+        raise NotationError(f"{surface} is touched at a section: nothing can be held there")
+    if location.margin is Margin.EXIT:
+        return vanished(orbit, i)
+    mode, exit_ = orbit.itinerary[i]
+    touch = touch_of(orbit, i, surface)
+    beyond = coming_back(orbit, mode, surface, touch)
+    if beyond is None:
+        raise NotationError(f"what passes {surface} in segment {i + 1} does not come back")
+    before, behind = (
+        second_rate(orbit, m, surface, float(touch[0]), touch[1:]) for m in (mode, beyond.mode)
+    )
+    edit = split(i, surface, (beyond.mode, surface), (mode, exit_))
+    away = {(i, 0): -1.0, (i, 1): 2.0 * before / behind - 1.0}
+    reason = f"{surface} is touched in segment {i + 1}: crossed, and met again"
+    return edit, {(i, 0): touch, (i, 1): touch}, away, reason
 
 
 def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:

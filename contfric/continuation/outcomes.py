@@ -37,16 +37,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation import standing_slides as slides
-from contfric.continuation.composed_outcomes import continuous_edit, vanished
+from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.touching import (
-    chosen_at,
-    coming_back,
-    crossed_at,
-    entered_at,
-    second_rate,
-    thrown_at,
-)
+from contfric.continuation.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -135,7 +128,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
     if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
         where = f"where segment {location.segment + 1} ends"
         raise NotationError(f"the wall {location.surface} is met {where}")
-    if orbit.model.composed and orbit.model.filippov:
+    if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Outcome(edit, joints, reason, away)
     if kind is Kind.CS:
@@ -151,8 +144,6 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
         return _grazing_impact(orbit, location)
     if location.margin is Margin.JOINT:
         raise NoJump(f"{location.surface} is touched at a section: nothing can be held there")
-    if crossed_at(orbit, location):
-        return _crossed_by_touch(orbit, location)
     if location.margin is Margin.LASTING:
         return _pinned_at_stop(orbit, location)
     rests, ends = ends_rest(orbit.model, mode, location.surface), location.margin is Margin.EXIT
@@ -369,29 +360,6 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
         raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
     reason = f"no impact on {location.surface} after segment {i + 1}"
     return Outcome(*slides.runs_on(orbit, i, behind), reason)
-
-
-def _crossed_by_touch(orbit: Orbit, location: EventFunction) -> Outcome:
-    """GS at a surface that is crossed: the time beyond it begins, or vanishes.
-
-    How fast the joints move apart: see :func:`~contfric.continuation.touching.speeds_of_crossing`.
-    """
-    i, surface = location.segment, location.surface
-    if location.margin is Margin.EXIT:
-        edit, joints, away, reason = vanished(orbit, i)
-        return Outcome(edit, joints, reason, away)
-    mode, exit_ = orbit.itinerary[i]
-    touch = touch_of(orbit, i, surface)
-    beyond = coming_back(orbit, mode, surface, touch)
-    if beyond is None:
-        raise NoJump(f"what passes {surface} in segment {i + 1} does not come back from there")
-    before, behind = (
-        second_rate(orbit, m, surface, float(touch[0]), touch[1:]) for m in (mode, beyond.mode)
-    )
-    edit = split(i, surface, (beyond.mode, surface), (mode, exit_))
-    away = {(i, 0): -1.0, (i, 1): 2.0 * before / behind - 1.0}
-    reason = f"{surface} is touched in segment {i + 1}: crossed, and met again"
-    return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, away)
 
 
 def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:

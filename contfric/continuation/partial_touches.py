@@ -19,7 +19,7 @@ from contfric.continuation.events import Bifurcation
 from contfric.continuation.incident import edited_whole, vanishing
 from contfric.continuation.leaving_touch import Leaving, leaving
 from contfric.continuation.outcomes import Outcome, outcome_at
-from contfric.continuation.touching import coming_back, crossed_at, speeds_of_crossing
+from contfric.continuation.touching import coming_back, crossed_at, is_crossed, speeds_of_crossing
 from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -38,12 +38,6 @@ _LEAST = 1e-6
 _NEXT = 1e-6
 
 
-def is_crossed(bifurcation: Bifurcation) -> bool:
-    """Tell whether an event is the touch of a surface that is crossed beyond it."""
-    whole = bifurcation.orbit.as_whole()
-    return all(crossed_at(whole, test) for test in bifurcation.tests)
-
-
 def partial_touches(
     bifurcation: Bifurcation, active: int, most_periods: int, copies: int
 ) -> Iterator[Candidate]:
@@ -54,7 +48,7 @@ def partial_touches(
     active : index of the parameter that varies
     most_periods, copies : longest orbits, in periods, and in copies of the solution at the event
     """
-    if bifurcation.orbit.model.autonomous:
+    if bifurcation.orbit.model.autonomous or not is_crossed(bifurcation):
         return
     periods = bifurcation.outline.periods
     try:

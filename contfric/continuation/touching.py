@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import is_section
 from contfric.orbit.system import EventFunction, Margin, System
 from contfric.signature.holds import is_hold
+
+if TYPE_CHECKING:
+    from contfric.continuation.events import Bifurcation
 
 #: A rate this small, at a joint on a section that is a rate itself, is rounding.
 _TANGENTIAL = 1e-9
@@ -264,6 +268,12 @@ def crossed_at(orbit: Orbit, test: EventFunction) -> bool:
         for domain in model.domains_of(whole)
         for target in model.targets.get((domain.name, test.surface), ())
     )
+
+
+def is_crossed(bifurcation: Bifurcation) -> bool:
+    """Tell whether an event is the touch of a surface that is crossed beyond it."""
+    whole = bifurcation.orbit.as_whole()
+    return all(crossed_at(whole, test) for test in bifurcation.tests)
 
 
 def speeds_of_crossing(orbit: Orbit, k: int) -> tuple[float, float]:
