@@ -358,7 +358,10 @@ def transfer(model: cf.Model, contacts: int) -> np.ndarray:
     return np.asarray(np.abs(dynamic[np.ix_(range(contacts), free)] @ moved))
 
 
-@pytest.mark.parametrize(("seed", "contacts"), [(0, 5), (1, 6), (2, 7), (3, 8)])
+SLOW = [pytest.param(*case, marks=pytest.mark.slow) for case in ((2, 7), (3, 8))]
+
+
+@pytest.mark.parametrize(("seed", "contacts"), [(0, 5), (1, 6), *SLOW])
 def test_many_contacts_that_never_slip_are_followed_until_one_does(
     seed: int, contacts: int
 ) -> None:
