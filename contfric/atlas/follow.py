@@ -37,6 +37,7 @@ from contfric.continuation.crossing import LOCATED, crossing_near
 from contfric.continuation.events import ACCURACY, TERMINAL, End, EndReason, Kind, Verdict
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
+from contfric.continuation.partial_touches import partial_touches
 from contfric.continuation.points import Settings, next_to
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
@@ -93,13 +94,13 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         state.judge(event, reason, Verdict.REFUSED, why=why)
         return
     active = orbit.model.index_of(state.settings.parameter)
-    edits = bool(orbit.model.resets) or any(
-        mode.sliding for mode in orbit.model.modes
-    )  # else nothing rests
+    edits = bool(orbit.model.resets) or any(m.sliding for m in orbit.model.modes)  # else no rest
     # the forms are the same both times where the event is known roughly; what else the second time tries is
     # what local conditions exclude, and these are not asked of many contacts
     once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
     tried: set[tuple[object, ...]] = set()  # by what an orbit is solved from: it ends the same
+    for candidate in partial_touches(event.bifurcation, active, state.max_periods, state.copies):
+        _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
         itineraries: set[Itinerary] = set()
@@ -113,9 +114,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
                     continue
                 tried.add(start)
             accepted = _judge(state, event, candidate) or accepted
-            if (
-                event.bifurcation.orbit is not orbit
-            ):  # better located: its outcomes are asked for anew
+            if event.bifurcation.orbit is not orbit:  # better located: outcomes are asked anew
                 state.waiting.appendleft(event)
                 return
             if composes(orbit) and goes_on(state, event):

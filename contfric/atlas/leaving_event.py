@@ -52,7 +52,8 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     assert orbit is not None
     settings = settings_for(orbit, state.settings)
     if candidate.away is not None:
-        branch = _leave_beside(state, orbit, _straight(candidate.away), event, settings)
+        way = _straight(candidate.away)
+        branch = _leave_beside(state, orbit, way, event, settings, candidate.share)
         return branch or _leave_together(state, orbit, event, settings)
     longest: tuple[Orbit, Side] | None = None
     for first_step in _NEAR_EVENT:

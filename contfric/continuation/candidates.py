@@ -43,6 +43,7 @@ class Candidate:
     away : how its joints move where it is singular at the event and has to start near it; else None
     rest : whether that is because nothing moves any more
     itineraries : of the units that it consists of
+    share : how the parameter moves with the joints, where that is known
     """
 
     reason: str
@@ -51,6 +52,7 @@ class Candidate:
     away: FloatArray | None = None
     rest: bool = False
     itineraries: frozenset[Itinerary] = frozenset()
+    share: float = 0.0
 
     @property
     def has_hold(self) -> bool:
@@ -138,7 +140,7 @@ def _candidate(unit: Unit, forms: tuple[Form, ...], reason: str) -> Candidate:
     orbit, away = _without_sections(orbit, away)
     if not np.any(away):
         return Candidate(reason, orbit, itineraries=itineraries)
-    return Candidate(reason, orbit, away=_along_motion(orbit, away), itineraries=itineraries)
+    return Candidate(reason, orbit, away=along_motion(orbit, away), itineraries=itineraries)
 
 
 def _without_sections(orbit: Orbit, away: FloatArray) -> tuple[Orbit, FloatArray]:
@@ -185,10 +187,10 @@ def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArr
         edited, moves = replace(edited, system=part, joints=joints), moves[: len(half)]
     if not np.any(moves):
         return edited, None
-    return edited, _along_motion(edited, moves)
+    return edited, along_motion(edited, moves)
 
 
-def _along_motion(orbit: Orbit, away: FloatArray) -> FloatArray:
+def along_motion(orbit: Orbit, away: FloatArray) -> FloatArray:
     """Return how joints move, states with times: where one part rests others go on, and a belt with it.
 
     What comes in has no length, and begins with the rate of the solution.

@@ -23,6 +23,7 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 from __future__ import annotations
 
 from contfric.continuation.shared_outcomes import in_other_order, limit_after, with_other_state
+from contfric.continuation.touching import coming_back, second_rate
 from contfric.continuation.zero_acceleration import only_comes_back, touch_of
 from contfric.errors import NotationError
 from contfric.models.composed import ComposedModel
@@ -51,13 +52,15 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
         If nothing follows from this location: the reason says why.
     """
     itinerary, i = orbit.itinerary, location.segment
+    if not orbit.model.composed:
+        return _crossed(orbit, location)
     if is_hold(itinerary[i][1]):
         raise NotationError(f"segment {i + 1} is a hold: nothing can be held where nothing jumps")
     if location.margin is Margin.JOINT:
         return _two_at_once(orbit, i, location.surface)
     if location.margin is Margin.INTERIOR:
         return _touched(orbit, i, location.surface)
-    return _vanished(orbit, i)
+    return vanished(orbit, i)
 
 
 def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
@@ -121,23 +124,55 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
     return edit, joints, speeds, f"{surface} is touched in segment {i + 1}: passed, and met again"
 
 
+def _crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit at the touch of a surface that is crossed: the time beyond it begins, or vanishes.
+
+    How fast the joints move apart: :func:`~contfric.continuation.touching.speeds_of_crossing`.
+    """
+    i, surface = location.segment, location.surface
+    if location.margin is Margin.JOINT:
+        raise NotationError(f"{surface} is touched at a section: nothing can be held there")
+    if location.margin is Margin.EXIT:
+        return vanished(orbit, i)
+    mode, exit_ = orbit.itinerary[i]
+    touch = touch_of(orbit, i, surface)
+    beyond = coming_back(orbit, mode, surface, touch)
+    if beyond is None:
+        raise NotationError(f"what passes {surface} in segment {i + 1} does not come back")
+    before, behind = (
+        second_rate(orbit, m, surface, float(touch[0]), touch[1:]) for m in (mode, beyond.mode)
+    )
+    edit = split(i, surface, (beyond.mode, surface), (mode, exit_))
+    away = {(i, 0): -1.0, (i, 1): 2.0 * before / behind - 1.0}
+    reason = f"{surface} is touched in segment {i + 1}: crossed, and met again"
+    return edit, {(i, 0): touch, (i, 1): touch}, away, reason
+
+
 def _there_and_back(model: Model, mode: str, surface: str) -> tuple[str, str]:
     """Return the mode after a surface, and the surface that leads back from there."""
     for other in model.targets.get((mode, surface), ()):
         for back, target in model.exits_of(other):
-            if target == mode:
+            if target == model.whole_mode(mode):
                 return other, back
     raise NotationError(f"{surface} does not bound '{mode}', or nothing leads back")
 
 
-def _vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
-    """Return the edit where a state of a contact has no length any more: the contact does not change."""
-    itinerary, n = orbit.itinerary, len(orbit.itinerary)
+def vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
+    """Return the edit where a segment between two of one mode has no length any more: it is left out.
+
+    So it is with a state of a contact, and beyond a surface that is crossed there and back.
+    """
+    itinerary, n, model = orbit.itinerary, len(orbit.itinerary), orbit.model
     for k in (i, (i + 1) % n):
         before, behind = (k - 1) % n, (k + 1) % n
-        if n > 2 and itinerary[before][0] == itinerary[behind][0] and not _lasts(orbit, k):
-            edit = Edit(frozenset({k, behind}), {before: itinerary[behind][1]})
-            return edit, {}, {}, f"segment {k + 1} vanishes"
+        modes = [itinerary[j][0] for j in (before, behind)]
+        if n < 3 or _lasts(orbit, k) or len(set(map(model.whole_mode, modes))) > 1:
+            continue
+        edit, joints = Edit(frozenset({k, behind}), {before: itinerary[behind][1]}), {}
+        if modes[0] != modes[1]:  # what ends on a section has the name of that side
+            edit = Edit(frozenset({before, k, behind}), {}, {before: (itinerary[behind],)})
+            joints = {(before, 0): orbit.cycle[before]}
+        return edit, joints, {}, f"segment {k + 1} vanishes"
     raise NotationError(f"segment {i + 1} ends tangentially, and what follows has some length")
 
 

@@ -10,7 +10,7 @@ from contfric.continuation.locations import locations_of
 from contfric.continuation.outcomes import NoJump, outcome_at
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
-from contfric.continuation.touching import entered_at, thrown_at
+from contfric.continuation.touching import entered_at, is_crossed, thrown_at
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import NotationError
@@ -205,6 +205,8 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     continuous = f"{kind.meaning}: the signature changes, the solution is continuous"
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
+    if is_crossed(bifurcation):
+        return continuous
     for location in locations_of(bifurcation)[: None if orbit.model.filippov else 1]:
         try:
             outcome_at(orbit.as_whole(), location, kind)

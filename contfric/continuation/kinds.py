@@ -20,6 +20,8 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
 entry      after a reset the state is on another  CS: another mode follows
            surface
 lasting    slide between two holds                 GS: the first can be left no more
+any        of a state of one of many contacts      as the exit by which it begins: AS of a slip, GS of a
+           that vanishes (:func:`beginning_of`)    stick
 =========  ======================================  ==========================================
 
 For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
@@ -57,6 +59,10 @@ _LATER = 1e-4
 
 def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     """Classify the vanishing of a margin; see the table of the module."""
+    began = beginning_of(test, orbit)
+    if began is not None:
+        mode, surface = orbit.itinerary[began]
+        return _kind_of_touch(system.model, mode, surface)
     model, mode = system.model, system.itinerary[test.segment][0]
     hold = hold_of_test(test, orbit)
     if hold is not None:
@@ -78,6 +84,21 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     if touched is not None:
         return _kind_of_touch(model, mode, touched)
     return Kind.CS if resting is None or _leaves(resting, test, orbit) else Kind.SS
+
+
+def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:
+    """Return the segment before one without length, after which a contact is as before it; else None.
+
+    Where many contacts are and nothing jumps. All margins of such a segment vanish together, and which of
+    them is met first is rounding: the event is what its beginning is.
+    """
+    k, itinerary = test.segment, orbit.itinerary
+    if not (orbit.model.composed and orbit.model.filippov) or len(itinerary) < 3:
+        return None
+    before, behind = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
+    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
+    vanished = bool(orbit.ends[k, 0] - orbit.begins[k][0] < _VANISHED)
+    return (k - 1) % len(itinerary) if same and vanished else None
 
 
 def _kind_of_touch(model: Model, mode: str, surface: str) -> Kind:

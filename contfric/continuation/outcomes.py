@@ -39,7 +39,7 @@ from dataclasses import dataclass, field
 from contfric.continuation import standing_slides as slides
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
-from contfric.continuation.touching import chosen_at, entered_at, thrown_at
+from contfric.continuation.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
     leaving_rate,
@@ -128,7 +128,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
     if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
         where = f"where segment {location.segment + 1} ends"
         raise NotationError(f"the wall {location.surface} is met {where}")
-    if orbit.model.composed and orbit.model.filippov:
+    if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Outcome(edit, joints, reason, away)
     if kind is Kind.CS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import is_section
 from contfric.orbit.system import EventFunction, Margin, System
+from contfric.signature.holds import is_hold
+
+if TYPE_CHECKING:
+    from contfric.continuation.events import Bifurcation
 
 #: A rate this small, at a joint on a section that is a rate itself, is rounding.
 _TANGENTIAL = 1e-9
@@ -239,11 +244,52 @@ def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Dom
         onwards = model.transitions.get((found.name, name))
         if onwards is not None and found.signs[name] * rate(found, name) < 0.0:
             found = model.domain_by_name[onwards]
-    speeds_up = _second_rate(orbit, found.own_mode, surface, t, y)
+    speeds_up = second_rate(orbit, found.own_mode, surface, t, y)
     return found if found.signs[surface] * speeds_up < 0.0 else None
 
 
-def _second_rate(orbit: Orbit, mode: str, surface: str, t: float, y: FloatArray) -> float:
+def crossed_at(orbit: Orbit, test: EventFunction) -> bool:
+    """Tell whether what touches a surface is crossed beyond the event: another mode lies behind, and no rest.
+
+    So it is at a preloaded stop, or a switch of the force.
+    """
+    model, (mode, exit_) = orbit.model, orbit.itinerary[test.segment]
+    at_section = test.margin is Margin.JOINT and (mode, exit_) in model.sections
+    if model.composed or is_hold(exit_):
+        return False
+    if not at_section and test.margin not in (Margin.INTERIOR, Margin.EXIT):
+        return False
+    rests = model.rests_on(test.surface) or model.mode_by_name[model.whole_mode(mode)].sliding
+    if rests or test.surface in model.reset_by_surface:
+        return False
+    whole = model.whole_mode(mode)
+    return any(
+        model.domain_by_name[target].mode != whole
+        for domain in model.domains_of(whole)
+        for target in model.targets.get((domain.name, test.surface), ())
+    )
+
+
+def is_crossed(bifurcation: Bifurcation) -> bool:
+    """Tell whether an event is the touch of a surface that is crossed beyond it."""
+    whole = bifurcation.orbit.as_whole()
+    return all(crossed_at(whole, test) for test in bifurcation.tests)
+
+
+def speeds_of_crossing(orbit: Orbit, k: int) -> tuple[float, float]:
+    """Return how fast the two joints of a passage of no length move in time, as the event is left.
+
+    Let the surface be passed by e. Before it the height has the curvature c, so that it is met at ``-w``, w
+    the root of ``2 e/c``, at the rate ``c w``. Beyond it the curvature is c', and it is met again after
+    ``2 w c/c'``.
+    """
+    (mode, surface), (beyond, _) = orbit.itinerary[k - 1], orbit.itinerary[k]
+    time, state = float(orbit.begins[k, 0]), orbit.begins[k, 1:]
+    before, behind = (second_rate(orbit, m, surface, time, state) for m in (mode, beyond))
+    return -1.0, 2.0 * before / behind - 1.0
+
+
+def second_rate(orbit: Orbit, mode: str, surface: str, t: float, y: FloatArray) -> float:
     """Return how fast the rate of a surface's observable changes along a mode."""
     observable = orbit.model.surface_by_name[surface].observable
     moved = orbit.flow.rate_gradient(mode, observable, t, y, 0)

@@ -6,7 +6,7 @@ a number, and a place in the tables of the flow and of the simulation, when its 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -25,10 +25,47 @@ if TYPE_CHECKING:
 Exit = tuple[str, str]
 
 
+class Parts(Made[str]):
+    """A mapping of parts of modes to modes: there are some even before one is asked for."""
+
+    def __init__(self, model: ComposedModel) -> None:
+        super().__init__(model.composition.parts.whole, self._is_part)
+        self._model = model
+
+    def _is_part(self, name: object) -> bool:
+        composition = self._model.composition
+        return composition.is_mode(name) and composition.parts.is_divided(str(name))
+
+    def __bool__(self) -> bool:
+        return bool(self._model.phase)
+
+
+class Sections(Set[Exit]):
+    """Pairs (part of a mode, surface of the phase): of all modes that it divides; visited ones are listed."""
+
+    def __init__(self, model: ComposedModel) -> None:
+        self._model = model
+
+    def __contains__(self, pair: object) -> bool:
+        part, surface = cast("Exit", pair)
+        return bool(surface) and surface == self._model.phase and part in self._model.joined
+
+    def __iter__(self) -> Iterator[Exit]:
+        model = self._model
+        return ((m.name, model.phase) for m in model.modes if m.name in model.joined)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __bool__(self) -> bool:
+        return bool(self._model.phase)
+
+
 class ComposedModel(Model):
     """A model whose modes are made when they are visited (:mod:`contfric.models.composition`).
 
-    ``modes`` and ``domains`` are those that were visited, in that order: one domain a mode.
+    ``modes`` and ``domains`` are those that were visited, in that order: one domain a mode. Modes in which an
+    orbit may stay are divided by the phase (:mod:`contfric.models.phases`), others are not.
     """
 
     @cached_property
@@ -125,18 +162,45 @@ class ComposedModel(Model):
         return self.composition.order(name)
 
     def domains_of(self, mode: str) -> tuple[Domain, ...]:
-        """Return the domains of a mode."""
-        return (self.domain_by_name[mode],)
+        """Return the domains of a mode: those of its parts, if the phase divides it."""
+        if not self.composition.parts.is_divided(mode):
+            return (self.domain_by_name[mode],)
+        part = self.composition.parts.part
+        return tuple(self.domain_by_name[part(mode, side)] for side in (1, -1))
 
     @cached_property
-    def sections(self) -> frozenset[tuple[str, str]]:
-        """Pairs (declared mode, surface) that lead from one part of a mode to another: none."""
-        return frozenset()
+    def joined(self) -> dict[str, str]:
+        """The mode that each mode is a part of, for modes that the phase divides."""
+        return Parts(self)
+
+    @cached_property
+    def sections(self) -> Sections:  # type: ignore[override]
+        """Pairs (part of a mode, surface) that lead from one part of a mode to the other."""
+        return Sections(self)
 
     @cached_property
     def section_sides(self) -> dict[tuple[str, str], int]:
         """The side from which each section is crossed."""
-        return {}
+        return Made(lambda pair: self.composition.parts.side(pair[0]), self.sections.__contains__)
+
+    def section_pair(self, mode: str, surface: str) -> tuple[str, str]:
+        """Return (mode, surface) of a section: no other mode crosses it."""
+        return mode, surface
+
+    def section_pairs(self, mode: str, surface: str) -> dict[int, tuple[str, str]]:
+        """Return (mode, surface) of a section that divides a mode, by the side from which it is crossed."""
+        if (mode, surface) not in self.sections:
+            return {}
+        return {side: (self.composition.parts.part(mode, side), surface) for side in (1, -1)}
+
+    def shown(self, domain: str) -> str:
+        """Return the domain that stands for one in labels: the first part of its mode."""
+        return self.composition.parts.whole(domain) if domain in self.joined else domain
+
+    @property
+    def phase_parts(self) -> frozenset[str]:
+        """The second parts of modes that were visited."""
+        return frozenset(m.name for m in self.modes if self.composition.parts.side(m.name) < 0)
 
     # ------------------------------------------------------------------------------ transitions
 
@@ -148,19 +212,31 @@ class ComposedModel(Model):
             if not self._leads(key):
                 return False
             name, surface = cast("Exit", key)
+            if key in self.sections:
+                return True
             alone = len(self.composition.ways(name)[surface]) == 1
             return alone or self.composition.limit(surface) is not None  # others may let go with it
 
-        return Made(lambda key: self.composition.ways(key[0])[key[1]][0].mode, has)
+        return Made(lambda key: self._led_to(key)[0], has)
 
     @cached_property
     def targets(self) -> Mapping[Exit, tuple[str, ...]]:  # type: ignore[override]
         """Every domain that can follow each (domain, surface)."""
-        ways = self.composition.ways
-        return Made(lambda key: tuple(w.mode for w in ways(key[0])[key[1]]), self._leads)
+        return Made(self._led_to, self._leads)
+
+    def _led_to(self, key: Exit) -> tuple[str, ...]:
+        if key in self.sections:
+            return (self._beyond(key[0]),)
+        return tuple(way.mode for way in self.composition.ways(key[0])[key[1]])
+
+    def _beyond(self, part: str) -> str:
+        """Return the other part of a mode that the phase divides."""
+        return self.composition.parts.part(part, -self.composition.parts.side(part))
 
     def _leads(self, key: Any) -> bool:
         name, surface = key
+        if key in self.sections:
+            return True
         return self.composition.is_mode(name) and surface in self.composition.ways(name)
 
     def exits_of(self, domain: str) -> Iterator[tuple[str, str]]:
@@ -168,6 +244,8 @@ class ComposedModel(Model):
         for surface, ways in self.composition.ways(domain).items():
             for way in ways:
                 yield surface, way.mode
+        if (domain, self.phase) in self.sections:
+            yield self.phase, self._beyond(domain)
 
     def exit_sides(self, mode: str, surface: str, after: str) -> dict[str, int]:
         """Return the sides of other surfaces where a mode is left through one into the following mode."""
@@ -180,16 +258,22 @@ class ComposedModel(Model):
 
     def follows(self, mode: str, surface: str, after: str) -> bool:
         """Return whether a mode can follow another one through a surface."""
-        return self.composition.way(mode, surface, after) is not None
+        if (mode, surface) in self.sections:
+            return self.whole_mode(after) == self.whole_mode(mode)
+        return self.composition.way(mode, surface, self.whole_mode(after)) is not None
 
     def rests_on(self, surface: str) -> bool:
         """Return whether some mode moves on a surface."""
         return surface in self.composition.rested_on
 
     def bounds_of(self, mode: str) -> tuple[str, ...]:
-        """Return the surfaces that bound a mode, in their order."""
+        """Return the surfaces that bound a mode, in their order; a section does not."""
         ways = self.composition.ways(mode)
         return tuple(sorted(ways, key=self.surface_index.__getitem__))
+
+    def cuts_of(self, mode: str) -> tuple[str, ...]:
+        """Return the surfaces at which a simulation stops in a mode: the section, too."""
+        return (*self.bounds_of(mode), *([self.phase] if mode in self.joined else []))
 
     def domain_at(self, signs: Mapping[str, int], mode: str = "") -> str | None:
         """Return the domain that a state with these signs is in, or leaves to from rest."""
@@ -199,15 +283,36 @@ class ComposedModel(Model):
         self, signs: Mapping[str, int], t: float, y: FloatArray, vector: FloatArray
     ) -> str | None:
         """Return the domain that a state is in, or leaves to from rest."""
-        return self.composition.mode_at(signs, (self.mapping(vector), t, y.tolist()))
+        found = self.composition.mode_at(signs, (self.mapping(vector), t, y.tolist()))
+        return found if signs.get(self.phase) != 0 else self.part_at(found, t, y, vector)
+
+    def part_at(self, mode: str, t: float, y: FloatArray, vector: FloatArray) -> str:
+        """Return the part of a mode that a state is in; on the section, that which it leads to."""
+        if mode not in self.joined:
+            return mode
+        view = self.view(vector)
+        height = view.height(self.phase, t, y)
+        seen = self.surface_by_name[self.phase].observable
+        return self.composition.parts.part(
+            mode, 1 if (height or view.rate(mode, seen, t, y)) > 0.0 else -1
+        )
 
     @cached_property
     def mirror_domain(self) -> dict[str, str]:
         """Image of each domain under the symmetry; empty if the model has none."""
         if self.symmetry is None:
             return {}
-        images = self.symmetry.surfaces
-        return Made(lambda name: self.composition.image(name, images), self.composition.is_mode)
+        return Made(self._image, self.composition.is_mode)
+
+    def _image(self, name: str) -> str:
+        assert self.symmetry is not None
+        whole = self.composition.image(name, self.symmetry.surfaces)
+        side = self.composition.parts.side(name)
+        return (
+            self.composition.parts.part(whole, side * self.symmetry.sense(self.phase))
+            if side
+            else whole
+        )
 
     # ------------------------------------------------------------------------------------- flow
 

@@ -46,4 +46,5 @@ def composed_from(description: Description) -> ComposedModel:
         domains=(composition.domain(quiet),),
         departures=(),
         filippov=composition.leaves_at_rest,
+        phase=description.phase,
     )

@@ -19,6 +19,7 @@ first visit; itineraries and signatures have the names.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -32,6 +33,7 @@ from contfric.models.description import ModeText
 from contfric.models.entries import SIDES, Part
 from contfric.models.made import Made
 from contfric.models.parts import Domain, Mode, Surface
+from contfric.models.phase_parts import PART, PhaseParts
 from contfric.models.shared_loads import Limit, Setting, load_name, suffix
 from contfric.models.shared_ways import Place, SharedWays
 from contfric.models.structure import Structure
@@ -54,6 +56,11 @@ class Composition:
     Parameters
     ----------
     description : of the structure, with the mode in which no contact acts
+
+    Attributes
+    ----------
+    phase : the surface of the phase; empty if no mode is divided
+    parts : which modes it divides
     """
 
     def __init__(self, description: Description) -> None:
@@ -67,27 +74,36 @@ class Composition:
         self._ways: dict[str, dict[str, tuple[Way, ...]]] = {}
         self._limits: dict[str, Limit | None] = {}
         self.declared = frozenset(s.name for s in description.surfaces)
+        self.parts = PhaseParts(self.acting, len(self.structure.coordinates), description.phase)
+        self.phase = description.phase
         self.shared = SharedWays(structure, description)
 
     def is_mode(self, name: object) -> bool:
         """Tell whether a name is that of a mode."""
         if name in self._places:
             return True
-        fits = isinstance(name, str) and len(name) == len(self.acting)
-        return fits and all(a in c.states for a, c in zip(str(name), self.acting, strict=True))
+        if not isinstance(name, str):
+            return False
+        whole = self.parts.whole(name)
+        fits = len(whole) == len(self.acting)
+        fits = fits and all(a in c.states for a, c in zip(whole, self.acting, strict=True))
+        return fits and (whole == name or self.parts.is_divided(whole))
 
     def order(self, name: str) -> int:
-        """Return the place of a mode among all, if they were listed."""
+        """Return the place of a mode among all, if they were listed: second parts come last."""
         if name not in self._places:
             place = 0
-            for letter, contact in zip(name, self.acting, strict=True):
+            for letter, contact in zip(self.parts.whole(name), self.acting, strict=True):
                 place = place * len(contact.states) + contact.states.index(letter)
-            self._places[name] = place
+            count = math.prod(len(c.states) for c in self.acting)
+            self._places[name] = place + count * name.endswith(PART)
         return self._places[name]
 
     def states_in(self, name: str) -> dict[str, str]:
         """Return the state of each contact."""
-        return {c.name: letter for c, letter in zip(self.acting, name, strict=True)}
+        return {
+            c.name: letter for c, letter in zip(self.acting, self.parts.whole(name), strict=True)
+        }
 
     def sides(self, name: str) -> dict[str, int]:
         """Return the sides of the surfaces that matter to a mode."""
@@ -103,7 +119,10 @@ class Composition:
 
     def domain(self, name: str) -> Domain:
         """Return the only domain of a mode, with the sides of the surfaces that matter to it."""
-        return Domain(name, name, self.sides(name), name)
+        if not self.parts.is_divided(name):
+            return Domain(name, name, self.sides(name), name)
+        sides = {**self.sides(name), self.phase: self.parts.side(name)}
+        return Domain(name, self.parts.whole(name), sides, name, declared=name)
 
     def text(self, name: str) -> ModeText:
         """Return the rates in a mode, and its sides; shared loads have names (:meth:`loads_in`)."""
@@ -316,6 +335,10 @@ class Composition:
         ----------
         place : parameters, time and state, for contacts at rest that share loads
         """
+        whole = self._mode_at(signs, place)
+        return self.parts.part(whole, signs.get(self.phase, 1))
+
+    def _mode_at(self, signs: Mapping[str, int], place: Place | None) -> str:
         states: dict[str, str] = {}
         for c in self.acting:
             if c.kind is ContactKind.SPRING:
@@ -340,7 +363,7 @@ class Composition:
         return "".join(states[c.name] for c in self.acting)
 
     def image(self, name: str, images: Mapping[str, str]) -> str:
-        """Return the image of a mode under a symmetry.
+        """Return the image of a mode under a symmetry: of a part the first one.
 
         Parameters
         ----------

@@ -58,6 +58,11 @@ class Surface:
     switching: bool = False
 
 
+#: Sides are the bits of one signed number of 64. Surfaces behind these, which come as solutions visit their
+#: modes, have none: no rule asks for their sides, and nothing lies on them.
+MOST_SURFACES = 62
+
+
 @dataclass(frozen=True)
 class Mode:
     """One smooth vector field.

@@ -14,15 +14,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
+from contfric.models.parts import MOST_SURFACES
 from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
 from contfric.models.sections import joined_modes
+
+if TYPE_CHECKING:
+    from contfric.models.definition import Model
 
 #: The key of what has been divided, and the name of the observable and the surface.
 KEY = "phase"
@@ -32,36 +37,54 @@ _SAME = 1e-9
 _POINTS = 8
 #: Where in a period: at no time at which solutions start, forces are largest, or simulations end.
 _LATE = 1
-#: The phase doubles the regions of a model: many contacts with friction have thousands already. Two friction
-#: contacts and a gap have 98, six gaps 64; with more modes than these regions are not even listed.
-_MOST_REGIONS = 128
+#: The phase doubles the regions of a model, which takes time where they are many: three friction contacts
+#: have 343, six gaps 64, four friction contacts 2401 (two seconds more to load). Models with more are divided
+#: once a solution stays in a mode for ever (:func:`with_phase`).
+_MOST_REGIONS = 343
+#: Models that are kept with their phase.
+_MODELS = 16
 
 
-def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
+def with_phase(model: Model) -> Model | None:
+    """Return a model whose modes the phase divides, however many its regions are; None if none has to be."""
+    if not model.definition or model.phase:
+        return None
+    return _with_phase(model.definition)
+
+
+@lru_cache(maxsize=_MODELS)
+def _with_phase(definition: str) -> Model | None:
+    from contfric.models.derive import model_from
+    from contfric.models.describe import describe, from_text
+
+    description = from_text(definition)
+    data = description.data()
+    parts = phase_parts(description, data, however_many=True)
+    return model_from(describe({**data, **parts})) if parts else None
+
+
+def phase_parts(
+    description: Description, data: Mapping[str, Any], however_many: bool = False
+) -> dict[str, Any]:
     """Return the parts of a model's data in which its modes are divided; none where none has to be.
 
     Parameters
     ----------
     data : with the field of each mode in it
+    however_many : even if its regions are many
     """
-    if (
-        not description.period
-        or description.phase
-        or description.structure
-        or _has_many(description)
-    ):
+    if not description.period or description.phase:
+        return {}
+    if description.structure:  # which modes it divides is told when they are visited
+        surfaces = len(description.surfaces)
+        return _phase_of(description, data) if surfaces < MOST_SURFACES else {}
+    if not however_many and _has_many(description):
         return {}
     staying = [mode.name for mode in _staying(description)]
     if not staying:
         return {}
-    names = description.names
-    taken = {
-        *names.states,
-        *names.parameters,
-        *names.parts,
-        *(s.name for s in description.surfaces),
-    }
-    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
+    added = _phase_of(description, data)
+    name = added[KEY]
     modes: dict[str, Any] = {}
     parts: dict[str, tuple[str, ...]] = {}
     for mode, entry in data["modes"].items():
@@ -74,7 +97,6 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
         parts[mode] = mode, other
         for part, side in (mode, "+"), (other, "-"):
             modes[part] = {**entry, "in": {**(entry.get("in") or {}), name: side}}
-    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
     named = {
         key: {**entry, "in": {**(entry.get("in") or {}), name: "+"}}
         for key, entry in (data.get("domains") or {}).items()
@@ -86,10 +108,26 @@ def phase_parts(description: Description, data: Mapping[str, Any]) -> dict[str, 
     return {
         **({"domains": named} if named else {}),
         **({FORCES: forces} if forces else {}),
-        "observables": {**(data.get("observables") or {}), name: formula},
-        "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
+        **added,
         "modes": modes,
         "resets": named_parts(data.get("resets") or {}, parts),
+    }
+
+
+def _phase_of(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the parts of a model's data in which it has the phase as a surface."""
+    names = description.names
+    taken = {
+        *names.states,
+        *names.parameters,
+        *names.parts,
+        *(s.name for s in description.surfaces),
+    }
+    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
+    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
+    return {
+        "observables": {**(data.get("observables") or {}), name: formula},
+        "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},
         KEY: name,
     }
 

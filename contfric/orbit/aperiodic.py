@@ -136,7 +136,7 @@ def goes_on(trajectory: Trajectory) -> str:
     for surface, side in signs.items():
         if surface in model.settled_sides:  # at rest on a wall it is on either side
             continue
-        sides = {d.signs[surface] for d in model.domains_of(whole)}
+        sides = {d.signs.get(surface, 0) for d in model.domains_of(whole)}
         if side and sides == {-side}:
             return (
                 f"the solution has left the region of '{mode}' at '{surface}', where no mode follows. "

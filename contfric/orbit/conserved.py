@@ -54,12 +54,13 @@ def conserved(model: Model, itinerary: Itinerary) -> FloatArray:
         exit_ for mode, exit_ in itinerary if model.reset_at(mode, exit_) is not None
     ):
         changes = np.hstack([changes, _jumps(model, surface)])
-    left, sizes, _ = np.linalg.svd(changes, full_matrices=not model.composed)
+    # all directions of the states, and of many columns not all of theirs
+    left, sizes, _ = np.linalg.svd(changes, full_matrices=changes.shape[1] < n)
     rank = int(np.sum(sizes > _ZERO))
     still = left[:, rank:].T
     if not len(still):
         return np.empty((0, n))
-    own, sizes, _ = np.linalg.svd(still @ places, full_matrices=not model.composed)
+    own, sizes, _ = np.linalg.svd(still @ places, full_matrices=False)
     return np.ascontiguousarray(own[:, : int(np.sum(sizes > _ZERO))].T @ still)
 
 

@@ -136,6 +136,9 @@ def _settled(
             return _settled(resting, params, state, time, longest, progress=progress)
     while True:
         check_rest(trajectory)
+        divided = _divided_by_phase(trajectory)
+        if divided is not None:
+            return _settled(divided, params, state, time, longest, progress=progress)
         _check_motion(trajectory)
         done, events = done + span, events + len(trajectory)
         if longest is None:
@@ -156,6 +159,16 @@ def _settled(
         span = min(span * _LONGER, most - done)
         heard(f"{span} more")
         trajectory = go_on(trajectory, span * unit, heard)
+
+
+def _divided_by_phase(trajectory: Trajectory) -> Model | None:
+    """Return the model with the phase as a section where a solution stays in a mode without one; or None."""
+    quiet = trajectory.end is SimulationEnd.QUIET and not goes_on(trajectory)
+    if not (quiet or trajectory.end is SimulationEnd.HELD):
+        return None
+    from contfric.models.phases import with_phase  # which reads the model again
+
+    return with_phase(trajectory.model)
 
 
 def _after_creep(trajectory: Trajectory) -> tuple[float, FloatArray] | None:
@@ -199,8 +212,6 @@ def _check_motion(trajectory: Trajectory) -> None:
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
             why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
-            if trajectory.model.composed:
-                why += " (where nothing slips, orbits are found for up to four contacts that share no load)"
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
         if missing and len(walls := _walls_met(trajectory)) > 1:
             raise ConvergenceError(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 
 import numpy as np
 
 from contfric.models.composed import ComposedModel
+from contfric.models.composition import Way
 from contfric.models.definition import FloatArray
+from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import (
     Tables,
     bits_of,
@@ -58,7 +61,8 @@ class GrowingTables:
             return model.mode_index[self._names[SOLVED - 1 - number]]
         mode, surface = model.modes[last[0]].name, model.surfaces[last[1]].name
         place = model.mapping(vector), t, y.tolist()
-        return model.mode_index[model.composition.after(mode, surface, place)]
+        after = model.composition.after(mode, surface, place)
+        return model.mode_index[model.part_at(after, t, y, vector)]
 
     def tables(self) -> Tables:
         """Return the tables, with a row for each mode that was visited."""
@@ -108,11 +112,21 @@ class GrowingTables:
             if model.composition.is_solved(name, surface):
                 rules = [((0, 0), "")]
             else:
-                rules = [(sides_of(model, way.where, ()), way.mode) for way in ways]
+                rules = [rule for way in ways for rule in self._rules_of(way)]
             found[model.surface_index[surface]] = rules
+        for surface in cut_bounds(model)[name]:
+            if (name, surface) in model.sections:
+                found[model.surface_index[surface]] = [((0, 0), model.transitions[name, surface])]
         self._rules.append(found)
         self._sliding.append(int(mode.sliding) * (1 + int(moves_on(model, mode))))
         self._under.append(surfaces_under(model, name))
+
+    def _rules_of(self, way: Way) -> Iterator[tuple[tuple[int, int], str]]:
+        """Yield the rules by which a mode follows, each of its parts on its side of the phase."""
+        model = self._model
+        for domain in model.domains_of(way.mode):
+            where = {s: side for s, side in domain.signs.items() if s == model.phase}
+            yield sides_of(model, {**way.where, **where}, ()), domain.name
 
     def _number(self, name: str) -> int:
         if not name:

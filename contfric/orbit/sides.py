@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contfric.compiled import helper
-from contfric.orbit.tables import MOST_SURFACES
+from contfric.models.parts import MOST_SURFACES
 
 
 @helper

@@ -62,11 +62,13 @@ def _at_phase(model: Model, domain: str | None, signs: dict[str, int]) -> str | 
     A mode that the phase divides has its own name on the first side only.
     """
     side = signs.get(model.phase, 0) if domain else 0
-    if domain is None or side == 0 or model.domain_by_name[domain].signs[model.phase] == side:
+    if domain is None or side == 0:
+        return domain
+    if model.domain_by_name[domain].signs.get(model.phase, side) == side:
         return domain
     here = {**model.domain_by_name[domain].signs, model.phase: side}
     mode = model.domain_by_name[domain].mode
-    return next((d.name for d in model.domains if d.mode == mode and d.signs == here), domain)
+    return next((d.name for d in model.domains_of(mode) if d.signs == here), domain)
 
 
 def _let_go(

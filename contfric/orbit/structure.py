@@ -27,7 +27,7 @@ def mode_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
 def cut_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Surfaces that bound each mode as it was declared, sections among them: a simulation stops there."""
     if isinstance(model, ComposedModel):
-        return mode_bounds(model)
+        return Made(model.cuts_of, model.composition.is_mode)
     return _bounds(model, {d.name: d.own_mode for d in model.domains})
 
 
@@ -108,6 +108,7 @@ def exit_domains(model: Model, mode: str, surface: str, following: str) -> tuple
 def mirror_mode(model: Model) -> Mapping[str, str]:
     """Image of each mode under the symmetry; that of a part of a mode is the whole image."""
     if isinstance(model, ComposedModel):
-        return model.mirror_domain
+        images = model.mirror_domain
+        return Made(lambda mode: model.whole_mode(images[mode]), images.__contains__)
     found = {d.mode: model.domain_by_name[model.mirror_domain[d.name]].mode for d in model.domains}
     return found | {part: found[whole] for part, whole in model.joined.items()}

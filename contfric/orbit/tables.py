@@ -17,12 +17,10 @@ import numpy as np
 from contfric.errors import ModelError, ParameterError
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import Mode, Model, Surface
+from contfric.models.parts import MOST_SURFACES
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 
-#: Sides are the bits of one signed number of 64. Surfaces behind these, which come as solutions visit their
-#: modes, have none: no rule asks for their sides, and nothing lies on them.
-MOST_SURFACES = 62
 #: What a surface is in ``Tables.bounds`` to a mode in which it has a reset.
 MAPPED = 2
 #: A rule for the sides of surfaces as bits: (mask, value, mode that follows).

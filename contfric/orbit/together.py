@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contfric.compiled import helper
-from contfric.orbit.tables import MOST_SURFACES
+from contfric.models.parts import MOST_SURFACES
 
 #: Distance, relative to 1 + its level, within which a surface is met together with another one: far above
 #: what rounding leaves of the same solution, far below what tells two events apart.

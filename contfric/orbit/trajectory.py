@@ -17,11 +17,12 @@ from numba import types
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
+from contfric.models.parts import MOST_SURFACES
 from contfric.orbit.resting import impacts_ahead, still_bounced
 from contfric.orbit.sides import mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
-from contfric.orbit.tables import MOST_SURFACES, Tables
+from contfric.orbit.tables import Tables
 from contfric.orbit.together import mode_together
 from contfric.orbit.walls import (
     MOST_AT_ONCE,

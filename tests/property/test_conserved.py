@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -252,11 +254,15 @@ def test_what_grows_on_one_side_grows_in_some_of_its_modes_only() -> None:
     assert only_grows(model, (("pps", "weak"), *down)) == ()
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_structure_of_which_friction_never_slips_moves_as_a_linear_one(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("seed", "rubbing"), [*((seed, 1 + seed % 2) for seed in range(6)), (6, 3), (7, 5), (8, 10)]
+)
+def test_a_structure_of_which_friction_never_slips_moves_as_a_linear_one(
+    seed: int, rubbing: int
+) -> None:
     """The masses at rest are taken out of the matrices; what is left is solved as a linear system."""
     draw = np.random.default_rng(seed)
-    n, rubbing = int(draw.integers(2, 6)), int(draw.integers(1, 3))
+    n = max(int(draw.integers(2, 6)), rubbing + 1) + (rubbing > 3)
     held = sorted(draw.choice(n, min(rubbing, n - 1), replace=False).tolist())
     chain = np.diag(2.0 + draw.random(n)) - np.eye(n, k=1) - np.eye(n, k=-1)
     mass, amplitudes, w = 1.0 + draw.random(n), draw.normal(size=n), 0.3 + draw.random()
@@ -313,3 +319,75 @@ def test_indices_are_not_summed_where_a_contact_that_rests_begins_to_slip() -> N
     diagram = cf.explore(cf.find_orbit(model, state=[0.0, 0.1, 0.0, 0.0]), "w", (0.8, 1.4))
     assert any(b.kind in (cf.Kind.AS, cf.Kind.GS) for b in diagram.bifurcations)
     assert diagram.verify().passed
+
+
+def many(seed: int, contacts: int, static: float = 1.0) -> cf.Model:
+    """A chain of masses of which all but one or two rub, and do not slip at first."""
+    draw = np.random.default_rng([5, seed])
+    n = contacts + 1 + int(draw.integers(2))
+    stiffness = np.diag(2.0 + draw.random(n)) - np.eye(n, k=1) - np.eye(n, k=-1)
+    return cf.Mechanism(
+        (1.0 + draw.random(n)).tolist(),
+        0.05 * stiffness,
+        stiffness,
+        contacts={
+            f"c{i}": {
+                "kind": "friction",
+                "velocity": f"v{i}",
+                "kinetic": "S",
+                "static": f"{static!r}*S",
+            }
+            for i in range(1, contacts + 1)
+        },
+        force={f"q{n}": "F*cos(w*t)"},
+        parameters={"F": 0.3, "w": float(draw.uniform(0.5, 0.9)), "S": 1.0},
+        period="2*pi/w",
+    )
+
+
+def transfer(model: cf.Model, contacts: int) -> np.ndarray:
+    """The force on each contact at rest, of a force of size 1 on the last mass, by the linear equations."""
+    data = json.loads(model.definition)["structure"]
+    p, n = model.defaults, len(data["mass"])
+    stiffness = np.array(data["stiffness"], dtype=float)
+    dynamic = stiffness * (1.0 + 0.05j * p["w"]) - p["w"] ** 2 * np.diag(
+        np.array(data["mass"], dtype=float)
+    )
+    free = list(range(contacts, n))
+    moved = np.linalg.solve(dynamic[np.ix_(free, free)], np.eye(len(free))[:, -1])
+    return np.asarray(np.abs(dynamic[np.ix_(range(contacts), free)] @ moved))
+
+
+SLOW = [pytest.param(*case, marks=pytest.mark.slow) for case in ((2, 7), (3, 8))]
+
+
+@pytest.mark.parametrize(("seed", "contacts"), [(0, 5), (1, 6), *SLOW])
+def test_many_contacts_that_never_slip_are_followed_until_one_does(
+    seed: int, contacts: int
+) -> None:
+    """The first slips where the largest of the forces on them, of the linear system, is S."""
+    model = many(seed, contacts)
+    first = float(1.0 / np.max(transfer(model, contacts)))
+    orbit = cf.find_orbit(model, {"F": 0.2 * first}, state=np.zeros(len(model.states)))
+    assert len(orbit.system.itinerary) <= 2
+    diagram = cf.explore(orbit, "F", (0.1 * first, 1.02 * first), max_periods=1)
+    assert not diagram.loose_ends
+    events = [b for b in diagram.bifurcations if b.params["F"] < first * (1.0 + 1e-9)]
+    assert [b.kind for b in events] == [cf.Kind.AS]
+    assert events[0].params["F"] == pytest.approx(first, rel=1e-10)
+    assert max(branch.values.max() for branch in diagram.branches) > 1.01 * first
+    assert diagram.verify(restarts=2).passed
+
+
+def test_a_datum_off_the_centre_is_kept_until_its_contact_creeps() -> None:
+    """Six contacts: the last rests where its springs pull, and reaches its limit on one side."""
+    model = many(9, 6)
+    first = float(1.0 / np.max(transfer(model, 6)))
+    state = np.zeros(len(model.states))
+    state[5] = 0.1
+    orbit = cf.find_orbit(model, {"F": 0.2 * first}, state=state)
+    assert len(orbit.system.layout.conserved) == 6
+    branch, *_ = cf.explore(orbit, "F", (0.1 * first, first), max_periods=1).branches
+    assert {end.reason.name for end in branch.ends} == {"RANGE", "SHAKEDOWN"}
+    for k in range(0, len(branch), 10):
+        assert branch[k].joints[:, 6] == pytest.approx(0.1, abs=1e-12)
