@@ -47,7 +47,7 @@ class EquilibriumDiagram(Shown):
     Examples
     --------
     >>> import contfric as cf
-    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
+    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0}, values=1)
     >>> [event.kind.value for event in found.events]
     ['H']
     """
