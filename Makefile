@@ -19,7 +19,7 @@ install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --
 	    || $(PIP) --editable '.[$(1)]'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup kernels wheel demo test lint types contracts unit test-all gate bench stress studies gallery docs notebooks clean
+.PHONY: help setup kernels wheel demo test lint types contracts unit pytest test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
 # What is imported is compiled once, not by each of the programs that the tests start, even where this is set:
 # without its bytecode scipy alone takes three times as long to load.
@@ -78,7 +78,7 @@ demo: $(STAMP)
 # What can be done at once, then pytest: its closing line is the last line.
 test: $(STAMP)
 	@$(MAKE) -j$(WORKERS) --output-sync=target lint types contracts kernels
-	@$(MAKE) unit
+	@$(MAKE) pytest
 
 lint: $(STAMP)
 	@echo "== ruff check"
@@ -95,6 +95,9 @@ contracts: $(STAMP)
 	@$(BIN)/lint-imports
 
 unit: $(STAMP) kernels
+	@$(MAKE) pytest
+
+pytest: $(STAMP)
 	@echo "== pytest"
 	@# a file by one worker: its kernels are loaded and its fixtures computed once, a tenth of the time
 	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile -m "not slow"

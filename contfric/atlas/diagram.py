@@ -8,8 +8,9 @@ from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from contfric.base.extras import need_flint, need_pandas
+from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
+from contfric.base.tabled import stacked
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
 from contfric.models.definition import Model
@@ -279,16 +280,10 @@ class Diagram(Shown):
         quantities : sequence of str
             More columns: quantities by name or as expressions.
         """
-        need_pandas()
-        import pandas as pd
-
-        tables = []
-        for i, branch in enumerate(self.branches):
-            table = branch.to_dataframe(quantities)
-            table.insert(0, "branch", i + 1)
-            table.insert(1, "signature", branch.name)
-            tables.append(table)
-        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+        return stacked(
+            ({"branch": i + 1, "signature": branch.name}, branch.to_dataframe(quantities))
+            for i, branch in enumerate(self.branches)
+        )
 
     def plot(
         self,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
-from contfric.base.extras import need_pandas
 from contfric.base.shown import Shown
+from contfric.base.tabled import stacked
 from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
@@ -154,16 +154,10 @@ class Plane(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points of all curves as one table, with the curve's number and label (pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        tables = []
-        for i, curve in enumerate(self.curves):
-            table = curve.to_dataframe()
-            table.insert(0, "curve", i + 1)
-            table.insert(1, "label", curve.label)
-            tables.append(table)
-        return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+        return stacked(
+            ({"curve": i + 1, "label": curve.label}, curve.to_dataframe())
+            for i, curve in enumerate(self.curves)
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the curves by kind and stability, with the points of codimension two."""

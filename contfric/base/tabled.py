@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -16,6 +17,27 @@ if TYPE_CHECKING:
 
 #: Arrays of one length by the names of the columns.
 Columns: TypeAlias = dict[str, NDArray[Any]]
+
+
+def as_table(columns: Any) -> pd.DataFrame:
+    """Return columns by their names, or rows, as a table (needs pandas)."""
+    need_pandas()
+    import pandas as pd
+
+    return pd.DataFrame(columns)
+
+
+def stacked(parts: Iterable[tuple[dict[str, Any], pd.DataFrame]]) -> pd.DataFrame:
+    """Return tables one below the other, each behind columns of one value (needs pandas)."""
+    need_pandas()
+    import pandas as pd
+
+    tables = []
+    for labels, table in parts:
+        for k, (name, value) in enumerate(labels.items()):
+            table.insert(k, name, value)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
 class Tabled(Shown):
@@ -37,10 +59,7 @@ class Tabled(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the columns as a table (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        return pd.DataFrame(self.columns())
+        return as_table(self.columns())
 
 
 class Coded(str, Enum):

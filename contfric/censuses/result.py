@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from contfric.base.extras import need_pandas
 from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
+from contfric.base.tabled import as_table
 from contfric.censuses.conditions import ClosedItinerary, Fate
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
@@ -131,10 +131,7 @@ class Census(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row an orbit (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        return pd.DataFrame(self.records())
+        return as_table(self.records())
 
     def records(self) -> list[dict[str, Any]]:
         """Return one mapping an orbit: name, periods, stops, images, stable, multipliers, extrema."""

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_flint, need_pandas
+from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
+from contfric.base.tabled import as_table
 from contfric.continuation.events import Bifurcation, End, Kind
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
@@ -354,11 +355,7 @@ class Branch(Shown):
         quantities : sequence of str
             More columns: quantities by name or as expressions.
         """
-        need_pandas()
-        import pandas as pd
-
         more = {name: self.quantity(name) for name in quantities}
-
         columns: dict[str, Any] = dict(self.params)
         if self.model.autonomous:
             columns["period"] = self.period
@@ -367,7 +364,7 @@ class Branch(Shown):
         columns |= more
         if self.stable is not None:
             columns["stable"] = self.stable
-        return pd.DataFrame(columns)
+        return as_table(columns)
 
     def plot(self, ax: Axes | None = None, row: QuantityLike = "x_max") -> Axes:
         """Draw one quantity of the branch against its parameter."""

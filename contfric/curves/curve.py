@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas
 from contfric.base.shown import Shown
+from contfric.base.tabled import as_table
 from contfric.continuation.events import Kind, meaning_of
 from contfric.curves.special import CurveEnd, SpecialPoint
 from contfric.errors import either
@@ -244,15 +244,12 @@ class Curve(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the points as a table: parameters, kind, stability, x_max, x_min (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
         columns: dict[str, Any] = dict(self.params)
         columns |= {"kind": [kind.value for kind in self.kinds], "stable": self.stable}
         orbits = list(self)
         columns["x_max"] = [orbit.x_max for orbit in orbits]
         columns["x_min"] = [orbit.x_min for orbit in orbits]
-        return pd.DataFrame(columns)
+        return as_table(columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the curve in its plane, dashed where no stable orbit is bounded."""

@@ -105,7 +105,7 @@ def ensemble(
     --------
     >>> import contfric as cf
     >>> box = {"S": (0.30, 0.34)}
-    >>> found = cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, {"Omega": 0.5, "S0": 0.4}, samples=6)
+    >>> found = cf.ensemble("coulomb", "Omega", (0.5, 0.55), box, {"Omega": 0.5, "S0": 0.4}, samples=6)
     >>> found.event("SN 1a").count
     6
     """

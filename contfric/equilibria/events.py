@@ -40,8 +40,8 @@ class EquilibriumEvent(Shown):
     Examples
     --------
     >>> import contfric as cf
-    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
-    >>> hopf = found.events[0]
+    >>> rest = cf.find_equilibria("popp", {"F": 0.0})[0]
+    >>> hopf = cf.continue_equilibrium(rest, "a2", (0.3, 0.8)).events[0]
     >>> hopf.kind.value, hopf.parameter
     ('H', 'a2')
     """
@@ -108,8 +108,8 @@ class HopfPoint(EquilibriumEvent):
     Examples
     --------
     >>> import contfric as cf
-    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
-    >>> hopf = found.events[0]
+    >>> rest = cf.find_equilibria("popp", {"F": 0.0})[0]
+    >>> hopf = cf.continue_equilibrium(rest, "a2", (0.3, 0.8)).events[0]
     >>> type(hopf).__name__, hopf.centre.lyapunov < 0
     ('HopfPoint', True)
     """

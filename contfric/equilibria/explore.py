@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.base.extras import need_pandas
 from contfric.base.shown import Shown
+from contfric.base.tabled import stacked
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.events import EquilibriumEvent, HopfPoint
 from contfric.equilibria.find import find_equilibria
@@ -47,7 +47,7 @@ class EquilibriumDiagram(Shown):
     Examples
     --------
     >>> import contfric as cf
-    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
+    >>> found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0}, values=1)
     >>> [event.kind.value for event in found.events]
     ['H']
     """
@@ -86,11 +86,7 @@ class EquilibriumDiagram(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each point of each branch (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        frames = [b.to_dataframe().assign(branch=k) for k, b in enumerate(self.branches)]
-        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+        return stacked(({}, b.to_dataframe().assign(branch=k)) for k, b in enumerate(self.branches))
 
     def plot(self, ax: Axes | None = None, state: str | None = None) -> Axes:
         """Draw one state of all branches along the parameter, on axes of a diagram if these are given."""

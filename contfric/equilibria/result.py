@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_pandas
 from contfric.base.shown import Shown
+from contfric.base.tabled import as_table
 from contfric.models.definition import FloatArray, Model
 
 if TYPE_CHECKING:
@@ -221,15 +221,12 @@ class Equilibria(Shown):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each equilibrium, virtual ones too (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
         rows: list[dict[str, Any]] = []
         for e in self.points:
             row: dict[str, Any] = {"mode": e.mode, "location": e.location.name.lower()}
             row |= {"pseudo": e.pseudo, "stable": e.stable}
             rows.append(row | dict(zip(self.model.states, e.state.tolist(), strict=True)))
-        return pd.DataFrame(rows)
+        return as_table(rows)
 
     def __str__(self) -> str:
         values = ", ".join(f"{k} = {v:g}" for k, v in self.params.items())

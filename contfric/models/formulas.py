@@ -189,3 +189,19 @@ def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
     """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
     parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
     return sorted({x for x in parts if x.free_symbols & set(moving)}, key=str)
+
+
+#: Functions that have values and limits at all numbers, and no jumps.
+_CONTINUOUS = (
+    *(sympy.Add, sympy.Mul, Abs, sympy.sin, sympy.cos, sympy.exp),
+    *(sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan),
+)
+
+
+def cannot_jump(expression: Any, moving: Collection[Any]) -> bool:
+    """Tell whether a formula is continuous wherever ``moving`` are: all that depends on them is."""
+    if not expression.free_symbols & set(moving) or expression.is_Symbol:
+        return True
+    whole = expression.is_Pow and expression.exp.is_Integer and expression.exp > 0
+    known = whole or isinstance(expression, _CONTINUOUS)
+    return known and all(cannot_jump(part, moving) for part in expression.args)

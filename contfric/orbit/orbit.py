@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.extras import need_flint, need_pandas
+from contfric.base.extras import need_flint
 from contfric.base.renamed import renamed
+from contfric.base.tabled import as_table
 from contfric.base.tally import tally
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
@@ -358,13 +359,10 @@ class Orbit(MeasuredOrbit):
 
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
         times, states, names = self.trajectory(points)
         columns: dict[str, Any] = {"t": times}
         columns |= {name: states[:, k] for k, name in enumerate(self.model.states)}
-        return pd.DataFrame({**columns, "domain": names})
+        return as_table({**columns, "domain": names})
 
     def certify(self) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from contfric.base.extras import need_pandas
 from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
+from contfric.base.tabled import as_table
 from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
@@ -149,10 +149,7 @@ class Trajectory(Shown):
 
     def to_dataframe(self, points: int = 1000) -> pd.DataFrame:
         """Return t, states, mode and event, at all events and ``points`` times between (needs pandas)."""
-        need_pandas()
-        import pandas as pd
-
-        return pd.DataFrame(self.columns(points))
+        return as_table(self.columns(points))
 
     def columns(self, points: int = 1000) -> dict[str, Any]:
         """Return the columns of :meth:`to_dataframe` without pandas."""

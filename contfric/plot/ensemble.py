@@ -48,7 +48,7 @@ def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = Fa
     --------
     >>> import contfric as cf
     >>> box, fixed = {"S": (0.30, 0.34)}, {"Omega": 0.5, "S0": 0.4}
-    >>> plot_ensemble(cf.ensemble("coulomb", "Omega", (0.48, 0.55), box, fixed, samples=6)).get_xlabel()
+    >>> plot_ensemble(cf.ensemble("coulomb", "Omega", (0.5, 0.55), box, fixed, samples=6)).get_xlabel()
     '$\\Omega$'
     """
     ax = axes_or_new(ax)

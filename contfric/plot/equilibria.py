@@ -88,7 +88,8 @@ def plot_equilibrium_diagram(
     Examples
     --------
     >>> import contfric as cf
-    >>> plot_equilibrium_diagram(cf.explore_equilibria("belt", "vb", (0.1, 1.0))).get_xlabel()
+    >>> found = cf.explore_equilibria("belt", "vb", (0.1, 1.0), values=1)
+    >>> plot_equilibrium_diagram(found).get_xlabel()
     '$\\mathrm{vb}$'
     """
     new = ax is None

@@ -106,9 +106,9 @@ def draws(count: int, seed: int, low: float = 0.35, high: float = 3.0):
 
 
 def test_amplitude_and_determinant() -> None:
-    """60 orbits from the signature alone, and three more of other friction from each of them."""
+    """30 orbits from the signature alone, and three more of other friction from each of them."""
     compared = 0
-    for omega, S, rng in draws(60, seed=3):
+    for omega, S, rng in draws(30, seed=3):
         assert DenHartog(omega, S).moves_on()
         orbit = cf.solve_orbit("coulomb", "0s", params(omega, S))
         compare(orbit)
@@ -122,7 +122,7 @@ def test_amplitude_and_determinant() -> None:
                 S0 = other + float(rng.choice([0.0, 0.9])) * (load - other)
                 compare(at(orbit, S=other, S0=S0))
                 compared += 1
-    assert compared >= 200
+    assert compared >= 100
 
 
 @pytest.mark.parametrize("distance", [1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5])

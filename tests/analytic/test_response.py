@@ -10,7 +10,7 @@ exponential, which knows no singular case, holds the reference itself.
 from __future__ import annotations
 
 import math
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 import pytest
@@ -192,7 +192,7 @@ def test_derivative(name: str) -> None:
     step = mpf(10) ** -25
     errors = []
     with mp.workdps(DIGITS):
-        for mode, params, rest in cases(seed=2):
+        for mode, params, rest in islice(cases(seed=2), 0, None, 3):  # each pair of them once
             t0, x0, v0, d = rest
             _, jac = advance(mode, vector(*params), t0, (x0, v0), d, [0, 1, 2, 3, 4])
             up, down = ([mpf(a) for a in (*params, *rest)] for _ in range(2))

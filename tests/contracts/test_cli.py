@@ -267,7 +267,7 @@ def test_a_full_disk(study, tmp_path) -> None:
     before = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (16_000, 16_000))"
     path = study(HEAD + EXPLORE + "want: [extrema, stops]\n")
     # numba's cache could not be written either: fill it first
-    assert finish(command("run", path, "--out", tmp_path / "warm"))[0] == Exit.DONE
+    assert main(["run", path, "--out", str(tmp_path / "warm")]) == Exit.DONE
     code, _, err = finish(command("run", path, "--out", out, before=before))
     assert code == Exit.FAILED, err
     assert err.count("\n") == 1

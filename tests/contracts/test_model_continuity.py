@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import pytest
+import sympy
 
 import contfric as cf
+from contfric.models import formulas
 
 MODEL = """
 name: {name}
@@ -118,3 +122,16 @@ def test_a_reset_that_jumps_is_refused(tmp_path, modes: str, map: str, jumps: bo
     report = cf.check_model(tmp_path / "model.yaml")
     assert report.ok != jumps
     assert any("after the reset at 'tick' jumps" in f.message for f in report.findings) == jumps
+
+
+def test_formulas_that_cannot_jump_are_told_from_those_that_may() -> None:
+    """Of the first nothing is tried; a wrong answer there would let a jump pass."""
+    x, p = sympy.symbols("x p")
+    parts = [x, x * x, formulas.Abs(x), sympy.tanh(40.0 * x), sympy.sin(x) / p, sympy.log(p)]
+    for one, other in product(parts, parts):
+        for whole in (one + other, one * other, sympy.exp(one - p * other)):
+            assert formulas.cannot_jump(whole, {x})
+    jumps = [formulas.Sign(x), formulas.Where(x, p, x), 1 / x, sympy.log(x), x ** sympy.S("1/2")]
+    for one, other in product(parts, [*jumps, formulas.Power(x, p), sympy.tan(x), sympy.floor(x)]):
+        assert not formulas.cannot_jump(one + 2 * other, {x})
+        assert formulas.cannot_jump(other.subs(x, p + 7), {x})

@@ -152,21 +152,21 @@ def test_saving_replaces_the_file(orbit, branch, tmp_path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["x.npz"]
 
 
-def test_million_points_take_seconds(branch, tmp_path) -> None:
-    count = 1_000_000
+def test_many_points_are_saved_as_arrays(branch, tmp_path) -> None:
+    count = 200_000
     grown = {
         name: np.resize(getattr(branch, name), (count, *getattr(branch, name).shape[1:]))
         for name in ("values", "joints", "arc", "labels", "turn_multipliers")
     }
     large = dataclasses.replace(branch, **grown)
     path = tmp_path / "large.npz"
-    start = time.perf_counter()
+    start = time.process_time()
     cf.save(large, path)
     loaded = cf.load(path)
-    seconds = time.perf_counter() - start
+    seconds = time.process_time() - start
     path.unlink()
     assert loaded.joints.tobytes() == large.joints.tobytes()
-    assert seconds < 20.0, "no point of a branch may be an object of its own on the way"
+    assert seconds < 4.0, "no point of a branch may be an object of its own on the way"
 
 
 def test_loading_does_not_load_the_engine(branch, tmp_path) -> None:

@@ -45,7 +45,7 @@ def found(orbit: cf.Orbit, diagram: cf.Diagram, tmp_path_factory: Any) -> dict[s
     grid = {"Omega": [0.5], "S": [0.3, 0.32]}
     data = [cf.Measured("x_max", 1.424, 0.005, {"Omega": 0.5})]
     rests = cf.find_equilibria("belt", starts=8)
-    rest = cf.explore_equilibria("belt", "vb", (0.1, 1.0), starts=8)
+    rest = cf.explore_equilibria("belt", "vb", (0.1, 1.0), starts=8, values=1)
     folder = tmp_path_factory.mktemp("study") / "out"
     scene = folder.with_name("scene.yaml")
     scene.write_text("model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n", encoding="utf-8")
@@ -62,7 +62,7 @@ def found(orbit: cf.Orbit, diagram: cf.Diagram, tmp_path_factory: Any) -> dict[s
         cf.stable_set(
             cf.solve_orbit("coulomb", "2s", PARAMS), {"x": (-2, 2), "v": (-1, 1)}, max_points=3
         ),
-        cf.ensemble("coulomb", "Omega", (0.48, 0.55), {"S": (0.3, 0.34)}, {"S0": 0.4}, samples=3),
+        cf.ensemble("coulomb", "Omega", (0.5, 0.55), {"S": (0.3, 0.34)}, {"S0": 0.4}, samples=3),
         *(rests, rests.points[0], rest, rest.branches[0]),
         cf.fit("coulomb", data, PARAMS, ["S"]),
         cf.check_model("coulomb"),

@@ -25,7 +25,9 @@ from contfric.orbit.solve import refine
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import is_closed_walk
 
-SEEDS = [*range(6), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(6, 12))]
+#: Each has an orbit, 3 has two; nine others, some without any, take four fifths of the time.
+FAST = (3, 4, 5)
+SEEDS = [seed if seed in FAST else pytest.param(seed, marks=pytest.mark.slow) for seed in range(12)]
 PERIODS, STOPS = 2, 6
 
 

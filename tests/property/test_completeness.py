@@ -21,8 +21,16 @@ from contfric.continuation.incident import incident_forms
 from contfric.continuation.sequences import count, lengths, necklaces
 from contfric.orbit.index import index_at_infinity, index_of, opening_sign
 
-#: The 60 scenes of the share that runs here, in parts that processes divide among themselves.
-SHARES = [range(start, start + 15) for start in range(0, 60, 15)]
+#: Of the first 60 scenes of seed 7: those that are cut at 60 branches, so that nothing is held against
+#: anything, and the three largest ones (33 to 60 branches), three quarters of the time of all.
+CUT, LARGE = (12, 51, 54), (23, 33, 52)
+SHARES = {
+    **{
+        f"{start}-{start + 14}": [k for k in range(start, start + 15) if k not in (*CUT, *LARGE)]
+        for start in range(0, 60, 15)
+    },
+    "large": list(LARGE),
+}
 EQUAL_MAXIMA = "a hold is left where its load has an equal maximum, which is no event"
 #: Scenes that gave different diagrams from different starts: S, S0, Omega, zeta, h; what varies, its range.
 CAUGHT = {
@@ -175,16 +183,16 @@ def test_a_start_that_is_symmetric_but_for_rounding_is_a_symmetric_branch() -> N
     assert branch.system.half
 
 
-@pytest.mark.parametrize("share", SHARES, ids=lambda share: f"{share.start}-{share.stop - 1}")
-def test_random_scenes(share: range) -> None:
+@pytest.mark.parametrize("share", SHARES)
+def test_random_scenes(share: str) -> None:
     """No difference outside of the degenerate classes; most scenes have something to restart."""
-    tally = Tally()
-    for index in share:
+    tally, scenes = Tally(), SHARES[share]
+    for index in scenes:
         tally.index = index
         restarts.one_scene(tally, restarts.scene(7, index), most=1, branches=60)
     assert not tally.failed, tally.failed
-    assert tally.counts["restarts"] > 2 * len(share) // 3
-    assert tally.counts["balances"] > len(share) // 2
+    assert tally.counts["restarts"] > 2 * len(scenes) // 3
+    assert tally.counts["balances"] > len(scenes) // 2
 
 
 def test_a_sum_tells_of_another_component() -> None:

@@ -154,7 +154,7 @@ def longest(omega):
     return min(40.0, 6 * math.pi / omega + 10.0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(parameters(), phases, places, st.floats(1e-3, 2.0), st.booleans())
 def test_a_slide_ends_at_its_first_zero_of_v(p, phase, x0, v0, up) -> None:
     mode, v0 = (0, v0) if up else (1, -v0)
@@ -169,7 +169,7 @@ def test_a_slide_ends_at_its_first_zero_of_v(p, phase, x0, v0, up) -> None:
         assert found == pytest.approx(roots[0], abs=1e-9)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(parameters(), phases, st.floats(1e-3, 1.5), st.booleans())
 def test_a_slide_from_rest_leaves_its_own_root(p, phase, excess, up) -> None:
     """It starts at v = 0, pushed by |u| = S + excess; the zero at the start is not an end."""
@@ -189,7 +189,7 @@ def test_a_slide_from_rest_leaves_its_own_root(p, phase, excess, up) -> None:
         assert found == pytest.approx(roots[0], abs=1e-7 * (1 + 1 / excess) ** 0.5)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=75, deadline=None)
 @given(parameters(), phases, places, st.floats(-2.0, 2.0), st.integers(0, 2), st.booleans())
 def test_the_load_meets_a_level_for_the_first_time(p, phase, x0, v0, mode, top) -> None:
     t0, end = phase / p[0], longest(p[0])
@@ -206,7 +206,7 @@ def test_the_load_meets_a_level_for_the_first_time(p, phase, x0, v0, mode, top) 
         assert found == pytest.approx(roots[0], abs=1e-8)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     parameters(), phases, places, st.floats(-2.0, 2.0), st.integers(0, 2), st.integers(0, 1), shares
 )
@@ -254,7 +254,7 @@ def grazings(draw):
     return mode, p, t - duration, start, duration, height, s * f1
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(grazings())
 def test_a_grazing_is_neither_missed_nor_invented(case) -> None:
     mode, p, t0, y0, duration, height, bend = case

@@ -82,7 +82,7 @@ def samples(zeta, end):
     return [float(d) for d in np.unique(np.concatenate([short, np.linspace(0.0, end, 40)[1:]]))]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(slides(), st.floats(-8.0, 1.0))
 def test_states_have_all_their_digits(slide, size):
     sign, p, t0, x0, v0 = slide
@@ -96,7 +96,7 @@ def test_states_have_all_their_digits(slide, size):
         assert abs(y[1] - exact.x(mpmath.mpf(d), 1)) < 2e-14 * speed * (1 + d)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(slides())
 def test_the_first_stop_is_the_first(slide):
     sign, p, t0, x0, v0 = slide
@@ -122,7 +122,7 @@ def test_the_first_stop_is_the_first(slide):
             assert y[1] == 0.0 and abs(y[0] - exact.x(at)) < 1e-14 * (3 + found)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(slides(), st.floats(-6.0, 1.3), st.sampled_from([LOAD, SPEED]))
 def test_stationary_points_are_all_there_are(slide, size, observable):
     sign, p, t0, x0, v0 = slide
@@ -163,9 +163,9 @@ def test_strong_damping_costs_no_more():
         cf.simulate("coulomb", params, periods=10)
         best = np.inf
         for _ in range(3):
-            began = time.perf_counter()
+            began = time.process_time()
             trajectory = cf.simulate("coulomb", params, periods=400)
-            best = min(best, time.perf_counter() - began)
+            best = min(best, time.process_time() - began)
         assert len(trajectory) > 800
         return best
 
@@ -179,7 +179,7 @@ def test_strong_damping_costs_no_more():
 def test_what_is_no_motion_is_answered_at_once(w, mode):
     times, values, y = np.empty(256), np.empty(256), np.empty(2)
     p = np.array([w, 0.3, 0.4, 0.0, 0.0])
-    began = time.perf_counter()
+    began = time.process_time()
     for t0, x0, end in (
         (18.9, 1.23, 3.1),
         (1e300, 0.0, 1e300),
@@ -189,4 +189,4 @@ def test_what_is_no_motion_is_answered_at_once(w, mode):
         for c in (LOAD, SPEED):
             assert stationary(mode, c, t0, np.array([x0, 0.0]), end, p, times, values) <= 256
             hit(mode, c, 0.4, False, t0, np.array([x0, 0.1]), end, p, y)
-    assert time.perf_counter() - began < 10.0
+    assert time.process_time() - began < 10.0

@@ -19,6 +19,7 @@ from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Domain, FloatArray, Reset
+from contfric.models.describe import from_text
 
 #: States that are tried, those of each mode from which lines are followed, and samples of a line.
 _TRIED, _STATES, _SAMPLES = 100, 2, 160
@@ -120,6 +121,7 @@ def _at_state(t: float, y: FloatArray, k: int, value: float) -> tuple[float, Flo
 
 def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
     """Check that no reset jumps between states that meet its surface in one mode."""
+    continuous = _continuous_resets(probe)
     for reset in probe.model.resets:
         known: dict[Sides, tuple[float, FloatArray]] = {}
         for domain, t, y in arrivals(probe, reset):
@@ -130,9 +132,10 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
             here = known.setdefault(_real_sides(probe, reset, domain.signs) | {side}, (t, y))
             if here[1] is y:
                 continue
-            values = partial(_behind, probe, reset, domain, here, (t, y))
             report.count(Topic.CONTINUITY)
-            found = jump_along(values, 0.0, 1.0)
+            if reset.surface in continuous:
+                continue
+            found = jump_along(partial(_behind, probe, reset, domain, here, (t, y)), 0.0, 1.0)
             if found is None:
                 continue
             state = probe.model.states[found[0]]
@@ -145,6 +148,22 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
             return
 
 
+def _continuous_resets(probe: Probe) -> set[str]:
+    """Return the surfaces whose resets are made of continuous functions: nothing has to be tried there."""
+    if not probe.model.definition:
+        return set()
+    from contfric.models.formulas import cannot_jump
+    from contfric.models.symbols import Formulas
+
+    formulas = Formulas(from_text(probe.model.definition))
+    moving = (formulas.t, *formulas.y)
+    return {
+        surface.name
+        for surface, image in zip(formulas.description.surfaces, formulas.resets(), strict=True)
+        if all(cannot_jump(value, moving) for value in image)
+    }
+
+
 def _behind(
     probe: Probe,
     reset: Reset,
@@ -155,9 +174,9 @@ def _behind(
 ) -> FloatArray | None:
     """Return the state after a reset from between two states; None where that is in another domain."""
     t, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
-    sides = _real_sides(probe, reset, probe.signs(t, y))
-    towards = domain.signs[reset.surface] * probe.rate(domain.own_mode, reset.surface, t, y) < 0.0
-    if not towards or sides != _real_sides(probe, reset, domain.signs):
+    if not domain.signs[reset.surface] * probe.rate(domain.own_mode, reset.surface, t, y) < 0.0:
+        return None
+    if _real_sides(probe, reset, probe.signs(t, y)) != _real_sides(probe, reset, domain.signs):
         return None
     return probe.reset(reset.surface, t, y).copy()
 
