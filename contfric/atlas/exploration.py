@@ -7,7 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.collect import Event
-from contfric.atlas.matching import SAME_SOLUTION, identity, on_branch, same_event, stops_distance
+from contfric.atlas.matching import (
+    SAME_SOLUTION,
+    identity,
+    identity_of,
+    on_branch,
+    same_event,
+    stops_distance,
+)
 from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
@@ -181,7 +188,7 @@ class Exploration:
         for index, branch in enumerate(self.branches):
             if branch.system.periods != orbit.periods or branch.system.half != orbit.system.half:
                 continue
-            if identity(branch[0]) != wanted:
+            if identity_of(branch) != wanted:
                 continue
             for end in branch.ends:
                 b = end.bifurcation

@@ -13,7 +13,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.itineraries import mirror_pairs
+from contfric.orbit.itineraries import mirror_pairs, whole_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import modulo
 from contfric.orbit.solve import refine
@@ -39,6 +39,12 @@ _APART = 0.05
 def identity(orbit: Orbit) -> frozenset[ReducedItinerary]:
     """Return the orbit's reduced itinerary and its mirror image, canonical."""
     return _images(orbit.model, orbit.itinerary)
+
+
+def identity_of(branch: Branch) -> frozenset[ReducedItinerary]:
+    """Return the identity of the orbits of a branch."""
+    system = branch.system
+    return _images(system.model, whole_of(system.model, system.itinerary, system.half))
 
 
 @cache
@@ -148,7 +154,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     """
     if orbit.periods != branch.system.periods or orbit.system.half != branch.system.half:
         return False
-    if identity(orbit) != identity(branch[0]):
+    if identity(orbit) != identity_of(branch):
         return False
     value = orbit.params[branch.parameter]
     mirror = orbit.model.symmetry is not None

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
-from contfric.atlas.matching import identity
+from contfric.atlas.matching import identity_of
 from contfric.atlas.plane import Family, Region
 from contfric.base.interrupts import held_back
 from contfric.curves.curve import Curve
@@ -210,7 +210,7 @@ def _living(box: PlaneRanges, section: Diagram, varies: int, cell: int) -> set[L
     for branch in section.branches:
         if branch.mirrored or branch.bridge:
             continue
-        itinerary = min(identity(branch[0]))
+        itinerary = min(identity_of(branch))
         below = branch.values - value
         for k in np.flatnonzero(below[:-1] * below[1:] <= 0.0):
             stable = branch.stable is not None and bool(branch.stable[k])

@@ -22,7 +22,7 @@ import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.degenerate import degenerate_events, unresolved
-from contfric.atlas.matching import identity, on_branch, same_location
+from contfric.atlas.matching import identity_of, on_branch, same_location
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
@@ -295,7 +295,7 @@ def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:
     width = diagram.range[1] - diagram.range[0]
     if known.mirrored or not all(unresolved(b, width) or is_short(b) for b in (branch, known)):
         return False
-    if known.system.half != branch.system.half or identity(known[0]) != identity(branch[0]):
+    if known.system.half != branch.system.half or identity_of(known) != identity_of(branch):
         return False
     ends, others = (
         [end.bifurcation for end in b.ends if end.bifurcation is not None] for b in (branch, known)

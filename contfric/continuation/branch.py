@@ -20,6 +20,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.itineraries import mirror_pairs, mirrored_labels
 from contfric.orbit.linear import of_two_halves
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.reading import read_signature
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
 
@@ -173,7 +174,8 @@ class Branch(Shown):
         edges = np.concatenate([[0], changes, [len(self)]])
         spans = self.arc[edges[1:] - 1] - self.arc[edges[:-1]]
         longest = int(np.argmax(spans))
-        return self[int(edges[longest] + edges[longest + 1]) // 2].name
+        middle = int(edges[longest] + edges[longest + 1]) // 2
+        return str(read_signature(self[middle], self.labels[middle]).name)
 
     @property
     def symmetric(self) -> bool:

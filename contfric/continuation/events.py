@@ -84,6 +84,9 @@ TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 #: The solution at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
 _SYMMETRIC = 1e-7
+#: A solution this far from its mirror image is another one, however badly its parameter is known: events that
+#: are as far apart are two (``_APART`` of :mod:`contfric.atlas.matching`).
+_ASYMMETRIC = 0.05
 
 
 class EndReason(str, Enum):
@@ -233,7 +236,9 @@ class Bifurcation(MeasuredEvent):
             return True
         if self.orbit.model.symmetry is None:
             return False
-        return self.outline.apart_from_image < max(_SYMMETRIC, self.accuracy)
+        apart = self.outline.apart_from_image
+        # accuracies cost: they are asked for last
+        return apart < _SYMMETRIC or (apart < _ASYMMETRIC and apart < self.accuracy)
 
     @property
     def outline(self) -> Outline:

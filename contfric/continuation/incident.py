@@ -100,11 +100,11 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
             unit, (), (Refusal("what moves", "nothing moves any more", True),), (), least
         )
     cut = divided(orbit, orbit.periods // bifurcation.outline.periods)
-    collection = _started(cut or orbit, unit_of(cut) if cut else unit, least)
+    collection, arrives = _started(cut or orbit, unit_of(cut) if cut else unit, least)
     unit = collection.unit
     if cut is None:
         locations = [(location, bifurcation.kind) for location in locations_of(bifurcation)]
-        collection.edit(orbit, np.zeros(len(orbit.itinerary)), "", locations)
+        collection.edit(orbit, arrives, np.zeros(len(orbit.itinerary)), "", locations)
     collection.close()
     return Incident(
         unit,
@@ -143,20 +143,19 @@ def _moves(orbit: Orbit) -> bool:
     return False
 
 
-def _started(orbit: Orbit, unit: Unit, least: float) -> _Collection:
-    """Return a collection with the forms of the branch that arrives.
+def _started(orbit: Orbit, unit: Unit, least: float) -> tuple[_Collection, frozenset[Itinerary]]:
+    """Return a collection with the forms of the branch that arrives, and their itineraries.
 
     Where its solution repeats itself to rounding only, the whole orbit is the unit.
     """
     collection = _Collection(unit, least)
     try:
-        collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
+        return collection, collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
     except NotationError:
         collection = _Collection(
             replace(unit, periods=orbit.periods, half=False, duration=orbit.period), least
         )
-        collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
-    return collection
+        return collection, collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
 
 
 class _Collection:
@@ -200,19 +199,17 @@ class _Collection:
             count = len(form.itinerary)
             locations = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
             away = np.concatenate([form.away, form.away]) if self.unit.half else form.away
-            self.edit(orbit, away, form.reason, locations)
+            self.edit(orbit, frozenset({form.itinerary}), away, form.reason, locations)
 
     def edit(
         self,
         orbit: Orbit,
+        before: frozenset[Itinerary],
         away: FloatArray,
         reason: str,
         locations: list[tuple[EventFunction, Kind]],
     ) -> None:
-        """Add the forms that follow from the outcomes at locations of an orbit."""
-        if not locations:
-            return
-        before = frozenset(piece.itinerary for piece in pieces(orbit, self.unit))
+        """Add the forms that follow from outcomes at locations of an orbit with the units ``before``."""
         for location, kind in locations:
             try:
                 outcome = outcome_at(orbit, location, kind)

@@ -192,21 +192,21 @@ def form_of(orbit: Orbit, away: FloatArray, unit: Unit, piece: UnitPiece, reason
 def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     """Return the segments with which the units of a whole orbit begin; None if one is not there."""
     period, whole = orbit.period, unit.model.whole_mode
-    gaps = np.abs(orbit.begins - unit.starts(round(period / unit.duration))[:, None])
+    gaps = orbit.begins - unit.starts(round(period / unit.duration))[:, None]
     if orbit.model.autonomous:
         gaps[:, :, 0] = 0.0
     else:
-        gaps[:, :, 0] = np.abs((gaps[:, :, 0] + 0.5 * period) % period - 0.5 * period)
+        gaps[:, :, 0] -= period * np.rint(gaps[:, :, 0] / period)
     lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
-    fits = (gaps.max(axis=2) < SAME_SOLUTION) & (lasts > SAME_SOLUTION * time_unit(orbit))
-    modes = [whole(mode) for mode, _ in orbit.itinerary]
-    wanted = [whole(unit.mode)]
+    fits = (np.abs(gaps).max(axis=2) < SAME_SOLUTION) & (lasts > SAME_SOLUTION * time_unit(orbit))
+    itinerary, wanted = orbit.itinerary, [whole(unit.mode)]
     if unit.half:
         wanted.append(whole(mirror_mode(unit.model)[unit.mode]))
     cuts = []
     for j, row in enumerate(fits.tolist()):
         mode = wanted[j % len(wanted)]
-        found = next((i for i, fit in enumerate(row) if fit and modes[i] == mode), None)
+        fitting = (i for i, fit in enumerate(row) if fit and whole(itinerary[i][0]) == mode)
+        found = next(fitting, None)
         if found is None:
             return None
         cuts.append(found)

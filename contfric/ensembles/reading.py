@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,25 +74,33 @@ def named_crossings(
     for k, (name, branch) in enumerate(zip(names, branches, strict=True)):
         if branch.mirrored:
             continue
-        found = crossings_of(branch, quantity, values)
         if k + 1 == len(branches) or not branches[k + 1].mirrored:
-            yield name, found
+            yield name, crossings_of([branch], quantity, values)[0]
             continue
-        other = crossings_of(branches[k + 1], quantity, values)
-        yield name, replace(found, row=np.maximum(found.row, other.row))
-        yield name + IMAGE, replace(other, row=np.minimum(found.row, other.row))
+        one, other = crossings_of(branches[k : k + 2], quantity, values)
+        yield name, replace(one, row=np.maximum(one.row, other.row))
+        yield name + IMAGE, replace(other, row=np.minimum(one.row, other.row))
 
 
-def crossings_of(branch: Branch, quantity: Quantity, values: FloatArray) -> Crossings:
-    """Return a quantity of every orbit of a branch at some values of its parameter.
+def crossings_of(
+    branches: Sequence[Branch], quantity: Quantity, values: FloatArray
+) -> list[Crossings]:
+    """Return a quantity of every orbit of a branch, and of its mirror image, at values of the parameter.
 
     Between two points of the branch parameter and quantity are cubics in the arclength, with slopes of
     parabolas through three points. Located events are points, too: stability changes there, and folds are
     not cut off.
+
+    Parameters
+    ----------
+    branches : the branch, and its mirror image if that is wanted: the same points, so that they differ in
+        the quantity alone
     """
-    arc, at, row, stable = _nodes(branch, quantity)
+    arc, both, stable = _nodes(branches, quantity)
     if len(arc) < 2:
-        return Crossings(np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros(0))
+        none = Crossings(np.zeros(0, np.int64), np.zeros(0, np.int8), np.zeros(0))
+        return [none for _ in branches]
+    at = both[0]
     low, high = np.minimum(at[:-1], at[1:]), np.maximum(at[:-1], at[1:])
     first = np.searchsorted(values, low, side="left")
     last = np.searchsorted(values, high, side="left")
@@ -100,27 +108,39 @@ def crossings_of(branch: Branch, quantity: Quantity, values: FloatArray) -> Cros
     counts = last - first
     k = np.repeat(np.arange(len(counts)), counts)
     index = first[k] + np.arange(len(k)) - np.repeat(np.cumsum(counts) - counts, counts)
-    both = np.array([at, row])
     slopes = np.gradient(both, arc, axis=1, edge_order=2 if len(arc) > 2 else 1)
-    along, across = (_Cubics(arc, y, slope, k) for y, slope in zip(both, slopes, strict=True))
-    return Crossings(index, stable[k], across.at(_shares(along, values[index]))[0])
+    along, *across = (_Cubics(arc, y, slope, k) for y, slope in zip(both, slopes, strict=True))
+    shares, known = _shares(along, values[index]), stable[k]
+    return [Crossings(index, known, cubics.at(shares)[0]) for cubics in across]
 
 
 def _nodes(
-    branch: Branch, quantity: Quantity
-) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int8]]:
-    """Return points and located events: arclength, parameter, quantity, stability of what follows."""
-    events = [b for b in branch.bifurcations if b.located and b.orbit.system is branch.system]
+    branches: Sequence[Branch], quantity: Quantity
+) -> tuple[FloatArray, FloatArray, NDArray[np.int8]]:
+    """Return arclength, then parameter and quantities, and the stability of what follows.
+
+    At points and located events of a branch, the first one; the others are its mirror images.
+    """
+    branch = branches[0]
     own = np.full(len(branch), -1) if branch.stable is None else branch.stable
+    use = [
+        k
+        for k, b in enumerate(branch.bifurcations)
+        if b.located and b.orbit.system is branch.system
+    ]
+    events = [branch.bifurcations[k] for k in use]
     arc = np.concatenate([branch.arc, [b.position for b in events]])
     at = np.concatenate([branch.values, [b.params[branch.parameter] for b in events]])
-    row = np.concatenate(
-        [of_branch(quantity, branch), [of_orbit(quantity, b.orbit) for b in events]]
-    )
+    rows = [
+        np.concatenate(
+            [of_branch(quantity, b), [of_orbit(quantity, b.bifurcations[k].orbit) for k in use]]
+        )
+        for b in branches
+    ]
     stable = np.concatenate([own, np.full(len(events), -2)]).astype(np.int8)
     order = np.argsort(arc, kind="stable")
     order = order[np.concatenate([[True], np.diff(arc[order]) > 0.0])]
-    arc, at, row, stable = arc[order], at[order], row[order], stable[order]
+    arc, both, stable = arc[order], np.array([at, *rows])[:, order], stable[order]
     # after an event a branch is as stable as at its next point
     points = np.flatnonzero(stable != -2)
     following = points[np.minimum(np.searchsorted(points, np.arange(len(arc))), len(points) - 1)]
@@ -128,7 +148,7 @@ def _nodes(
     stable[:1] = stable[
         1:2
     ]  # at the event that a branch begins at a multiplier is on the unit circle
-    return arc, at, row, stable
+    return arc, both, stable
 
 
 class _Cubics:

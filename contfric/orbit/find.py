@@ -325,7 +325,7 @@ def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
     joints = np.column_stack(
         [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
     )
-    itinerary, end = trajectory.itinerary[first + 1 :], float(trajectory.times[-1])
+    itinerary, end = trajectory.itinerary_from(first + 1), float(trajectory.times[-1])
     if not model.autonomous:
         end = float(joints[0, 0]) + turns * period
     smooth = is_smooth(model, itinerary)

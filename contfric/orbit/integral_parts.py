@@ -35,8 +35,13 @@ _LAST = np.ascontiguousarray(SERIES[-8:])
 #: Pairs of coefficients from the last one to twice the degree; a third of them that are compared.
 _PAIRS, _THIRD = 8.0, 1.0 / 3.0
 #: Entries of a part that waits: its ends, depth, the share of noise of the part that it is a half of, in
-#: values alone and with derivatives; 1 if the values of that part are resolved; then sizes.
-LOW, HIGH, DEPTH, LIGHT, EXACT, KNOWN, SIZES = range(7)
+#: values alone and with derivatives; what is asked of it first; which half it is; then sizes.
+LOW, HIGH, DEPTH, LIGHT, EXACT, ASKED, HALF, SIZES = range(8)
+#: What is asked of a part first: its values alone, which cost a fraction of the derivatives; the derivatives,
+#: where the values of the part that it is a half of are resolved, and where its own are likely to be.
+VALUES_FIRST, VALUES_KNOWN, ALL_AT_ONCE = range(3)
+#: A part is the first half of another one, the second, or the second where the first one was cut.
+FIRST_HALF, SECOND_HALF, AFTER_A_CUT = range(3)
 #: What Gauss' formula may miss of a derivative: a sum of so many numbers is rounded to that.
 _SUMMED = NODES * float(np.finfo(np.float64).eps)
 
@@ -95,7 +100,9 @@ class IntegralWorkspace(NamedTuple):
     gradient : of an output by time, states and parameters
     signs : least and largest noted arguments, shape (noted, 2)
     data, values_only : outputs at the nodes of a part, shapes (L, nodes, C) and (L, nodes, 1)
-    wholes : outputs at the nodes of each segment as one part, shape (segments, L, nodes, 1)
+    wholes : outputs at the nodes of each segment as one part, shape (segments, L, nodes, C)
+    states, jacs : states and derivatives at these nodes in the first half of a symmetric orbit, whose images
+        are those of the second, shapes (segments, nodes, n) and (segments, nodes, n, 2 + n + parameters)
     row : integral over a segment and its gradient, shape (L, C)
     least : sizes below which values are rounding, shape (L,)
     waiting : parts of a segment that are to be resolved
@@ -112,6 +119,8 @@ class IntegralWorkspace(NamedTuple):
     data: FloatArray
     values_only: FloatArray
     wholes: FloatArray
+    states: FloatArray
+    jacs: FloatArray
     row: FloatArray
     least: FloatArray
     waiting: FloatArray
@@ -135,9 +144,11 @@ def chain_workspace(size, n, which, exact):  # type: ignore[no-untyped-def]
 
 
 @allocating_helper
-def integral_workspace(tape, whole, m, parameters, which, none, exact, columns):  # type: ignore[no-untyped-def]
-    """Return the workspace for an orbit of so many segments."""
-    n, size, outputs = m - 1, tape.operations.shape[0], tape.outputs.shape[0]
+def integral_workspace(  # type: ignore[no-untyped-def]
+    tape, whole, m, parameters, which, none, images, columns
+):
+    """Return the workspace for an orbit of so many segments, of so many of which others are images."""
+    n, size, outputs, exact = m - 1, tape.operations.shape[0], tape.outputs.shape[0], columns > 1
     return IntegralWorkspace(
         equation_workspace(whole, m, which.shape[0]),
         chain_workspace(size, n, which, exact),
@@ -148,7 +159,9 @@ def integral_workspace(tape, whole, m, parameters, which, none, exact, columns):
         np.empty((tape.noted.shape[0], 2)),
         np.empty((outputs, NODES, columns)),
         np.empty((outputs, NODES, 1)),
-        np.empty((whole, outputs, NODES, 1)),
+        np.empty((whole, outputs, NODES, columns)),
+        np.empty((images, NODES, n)),
+        np.empty((images, NODES, n, 2 + n + which.shape[0])),
         np.empty((outputs, columns)),
         np.zeros(outputs),
         np.empty((DEEPEST + 2, SIZES + outputs)),
@@ -199,33 +212,102 @@ def write_gradient(gradient, jac, which, share, out):  # type: ignore[no-untyped
 
 
 @helper
-def sample_part(course, low, high, own, chain, data):  # type: ignore[no-untyped-def]
-    """Write outputs and their gradients at the nodes of a part; False if a noted argument changes sign."""
-    signs, tape, n = own.signs, course.tape, course.begin.shape[0]
+def forget_signs(signs):  # type: ignore[no-untyped-def]
+    """Forget the least and largest noted arguments."""
     for q in range(signs.shape[0]):
         signs[q, 0], signs[q, 1] = np.inf, -np.inf
-    for k in range(NODES):
-        share = low + 0.5 * (high - low) * (POINTS[k] + 1.0)
-        after = share * course.lasts
-        reach_node(course, after, chain, own.equations.between)
-        evaluate_tape(
-            course, course.start + after, chain.state, chain.which, own.values, chain.grads
-        )
-        for q in range(signs.shape[0]):
-            value = own.values[tape.noted[q]]
-            signs[q, 0], signs[q, 1] = min(signs[q, 0], value), max(signs[q, 1], value)
-        for j in range(data.shape[0]):
-            output = tape.outputs[j]
-            data[j, k, 0] = own.values[output]
-            if data.shape[2] > 1:
-                differentiate_tape(
-                    tape, output, n, chain.which, own.values, chain.grads, own.weights, own.gradient
-                )
-                write_gradient(own.gradient, chain.jac, chain.which, share, data[j, k])
+
+
+@helper
+def keeps_signs(signs):  # type: ignore[no-untyped-def]
+    """Tell whether no noted argument changed its sign."""
     for q in range(signs.shape[0]):
         if signs[q, 0] < 0.0 and signs[q, 1] > 0.0:
             return False
     return True
+
+
+@helper
+def sample_node(course, k, share, own, chain, data):  # type: ignore[no-untyped-def]
+    """Write outputs and their gradients at node k of a part, where the chain is; note arguments."""
+    signs, tape, n = own.signs, course.tape, course.begin.shape[0]
+    time = course.start + share * course.lasts
+    evaluate_tape(course, time, chain.state, chain.which, own.values, chain.grads)
+    for q in range(signs.shape[0]):
+        value = own.values[tape.noted[q]]
+        signs[q, 0], signs[q, 1] = min(signs[q, 0], value), max(signs[q, 1], value)
+    for j in range(data.shape[0]):
+        output = tape.outputs[j]
+        data[j, k, 0] = own.values[output]
+        if data.shape[2] > 1:
+            differentiate_tape(
+                tape, output, n, chain.which, own.values, chain.grads, own.weights, own.gradient
+            )
+            write_gradient(own.gradient, chain.jac, chain.which, share, data[j, k])
+
+
+@helper
+def sample_part(course, low, high, own, chain, data):  # type: ignore[no-untyped-def]
+    """Write outputs and their gradients at the nodes of a part; False if a noted argument changes sign."""
+    forget_signs(own.signs)
+    for k in range(NODES):
+        share = low + 0.5 * (high - low) * (POINTS[k] + 1.0)
+        reach_node(course, share * course.lasts, chain, own.equations.between)
+        sample_node(course, k, share, own, chain, data)
+    return keeps_signs(own.signs)
+
+
+@helper
+def image_node(layout, state, jac, d_period, chain):  # type: ignore[no-untyped-def]
+    r"""Write state and derivatives half a period later in a symmetric orbit, from those at a node.
+
+    With the symmetry S, its own inverse, and the duration h of the half, the flow has :math:`\varphi(t_0 + h,
+    S y, d; p) = S \varphi(t_0, y, d; p)` for all p, so that
+
+    .. math:: \varphi_y' = S \varphi_y S, \qquad \varphi_p' = S (\varphi_p - \varphi_{t_0} h_p) .
+    """
+    n, closure, moved = state.shape[0], layout.closure, chain.moved
+    for i in range(n):
+        chain.state[i] = 0.0
+        for j in range(n):
+            chain.state[i] += closure[i, j] * state[j]
+        for k in range(jac.shape[1]):
+            moved[i, k] = jac[i, k]
+            if k > 1 + n:
+                moved[i, k] -= jac[i, 0] * layout.turn * d_period[k - 2 - n]
+            elif 1 <= k <= n:
+                moved[i, k] = 0.0
+                for j in range(n):
+                    moved[i, k] += jac[i, 1 + j] * closure[j, k - 1]
+    for i in range(n):
+        for k in range(jac.shape[1]):
+            chain.jac[i, k] = 0.0
+            for j in range(n):
+                chain.jac[i, k] += closure[i, j] * moved[j, k]
+
+
+@helper
+def sample_at_once(course, layout, i, d_period, own, data):  # type: ignore[no-untyped-def]
+    """Write outputs and gradients at the nodes of segment i as one part; False if a sign changes.
+
+    In the second half of a symmetric orbit states and derivatives are images of those in the first.
+    """
+    chain, images = own.exact, own.states.shape[0]
+    forget_signs(own.signs)
+    for k in range(NODES):
+        share = 0.5 * (POINTS[k] + 1.0)
+        if images > 0 and i >= images:
+            base = i - images
+            image_node(layout, own.states[base, k], own.jacs[base, k], d_period, chain)
+        else:
+            reach_node(course, share * course.lasts, chain, own.equations.between)
+            if images > 0:
+                for j in range(chain.state.shape[0]):
+                    own.states[i, k, j] = chain.state[j]
+                    for c in range(chain.jac.shape[1]):
+                        own.jacs[i, k, j, c] = chain.jac[j, c]
+        sample_node(course, k, share, own, chain, data)
+    return keeps_signs(own.signs)
 
 
 @helper

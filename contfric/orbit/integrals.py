@@ -27,17 +27,25 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.integral_parts import (
+    AFTER_A_CUT,
+    ALL_AT_ONCE,
+    ASKED,
     DEPTH,
     EXACT,
+    FIRST_HALF,
+    HALF,
     HIGH,
-    KNOWN,
     LIGHT,
     LOW,
+    SECOND_HALF,
     SIZES,
+    VALUES_FIRST,
+    VALUES_KNOWN,
     IntegralCourse,
     add_part,
     integral_workspace,
     resolved,
+    sample_at_once,
     sample_part,
 )
 from contfric.orbit.peak import Extreme, ExtremeType, extreme_workspace, fill_cycle
@@ -53,50 +61,88 @@ TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
 
 
 @helper
+def begin_parts(own):  # type: ignore[no-untyped-def]
+    """Let the whole segment wait, and forget the last nodes."""
+    own.row[:, :] = 0.0
+    first = own.waiting[0]
+    first[LOW], first[HIGH], first[DEPTH] = 0, 1, 0
+    first[LIGHT], first[EXACT], first[HALF] = np.inf, np.inf, AFTER_A_CUT
+    first[ASKED] = ALL_AT_ONCE if own.data.shape[2] > 1 else VALUES_FIRST
+    for j in range(own.least.shape[0]):
+        first[SIZES + j] = own.least[j]
+    own.exact.after[0], own.light.after[0] = -1.0, -1.0
+
+
+@helper
+def cut_part(own, count, left, with_slopes, known):  # type: ignore[no-untyped-def]
+    """Let both halves of a part wait, which was taken from place ``count``.
+
+    What is hard to resolve is most often at one end: where a first half was cut the second one is likely to
+    be resolved, and in a second half after one that was not cut the first half is. There values and
+    derivatives are taken at once.
+    """
+    waiting, slopes = own.waiting, own.data.shape[2] > 1
+    low, high, depth, half = (
+        waiting[count, LOW],
+        waiting[count, HIGH],
+        waiting[count, DEPTH],
+        waiting[count, HALF],
+    )
+    if half == FIRST_HALF:
+        waiting[count - 1, HALF] = AFTER_A_CUT
+        if slopes and waiting[count - 1, ASKED] == VALUES_FIRST:
+            waiting[count - 1, ASKED] = ALL_AT_ONCE
+    middle = 0.5 * (low + high)
+    for j in range(own.least.shape[0]):
+        waiting[count + 1, SIZES + j] = waiting[count, SIZES + j]
+    for k in range(2):
+        part = waiting[count + k]
+        part[LOW], part[HIGH] = (middle, high) if k == 0 else (low, middle)
+        part[DEPTH], part[LIGHT], part[EXACT] = depth + 1, left, with_slopes
+        part[HALF] = SECOND_HALF if k == 0 else FIRST_HALF
+        part[ASKED] = VALUES_KNOWN if known else VALUES_FIRST
+        if slopes and not known and k == 1 and half == SECOND_HALF:
+            part[ASKED] = ALL_AT_ONCE
+
+
+@helper
 def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
     """Write the integral over a segment, and its gradient; False if it is left to others.
 
-    The values alone, which cost a fraction of the derivatives, say first which parts there are. Those of the
-    whole segment are known. Where they are resolved, those of both halves are.
+    Of a part that is not likely to be resolved the values are asked first, which cost a fraction of the
+    derivatives. The whole segment is known. Where values are resolved, those of both halves are.
     """
     waiting, row, data = own.waiting, own.row, own.data
-    row[:, :] = 0.0
-    waiting[0, LOW], waiting[0, HIGH], waiting[0, DEPTH] = 0, 1, 0
-    waiting[0, LIGHT], waiting[0, EXACT], waiting[0, KNOWN] = np.inf, np.inf, 0
-    for j in range(data.shape[0]):
-        waiting[0, SIZES + j] = own.least[j]
+    begin_parts(own)
     count = 1
-    own.exact.after[0], own.light.after[0] = -1.0, -1.0
     while count > 0:
         count -= 1
-        low, high, depth = waiting[count, LOW], waiting[count, HIGH], waiting[count, DEPTH]
-        light = own.values_only if depth > 0 else whole
-        left, fine = waiting[count, LIGHT], waiting[count, KNOWN] == 1
-        if not fine:
+        part = waiting[count]
+        low, high, depth, asked = part[LOW], part[HIGH], part[DEPTH], part[ASKED]
+        left, with_slopes, known = part[LIGHT], np.inf, asked == VALUES_KNOWN
+        if asked == VALUES_FIRST:
+            light = own.values_only if depth > 0 else whole
             if depth > 0 and not sample_part(course, low, high, own, own.light, light):
                 return False
-            left, fine = resolved(light, waiting[count], LIGHT, level)
-        known, with_slopes = fine, np.inf
-        if fine and data.shape[2] == 1:
-            add_part(light, low, high, course.lasts, row)
-            continue
-        if fine:
-            if not sample_part(course, low, high, own, own.exact, data):
+            left, known = resolved(light, part, LIGHT, level)
+            if known and data.shape[2] == 1:
+                add_part(light, low, high, course.lasts, row)
+                continue
+        if known or asked == ALL_AT_ONCE:
+            found = whole if depth == 0 and asked == ALL_AT_ONCE else data
+            if (depth > 0 or asked != ALL_AT_ONCE) and not sample_part(
+                course, low, high, own, own.exact, data
+            ):
                 return False
-            with_slopes, fine = resolved(data, waiting[count], EXACT, level)
-            if fine:
-                add_part(data, low, high, course.lasts, row)
+            if asked == ALL_AT_ONCE:
+                left, known = resolved(found[:, :, :1], part, LIGHT, level)
+            with_slopes, fine = resolved(found, part, EXACT, level)
+            if known and fine:
+                add_part(found, low, high, course.lasts, row)
                 continue
         if depth >= DEEPEST or not left < np.inf:
             return False
-        middle = 0.5 * (low + high)
-        for j in range(data.shape[0]):
-            waiting[count + 1, SIZES + j] = waiting[count, SIZES + j]
-        for k in range(2):
-            part = waiting[count + k]
-            part[LOW], part[HIGH] = (middle, high) if k == 0 else (low, middle)
-            part[DEPTH], part[LIGHT], part[EXACT] = depth + 1, left, with_slopes
-            part[KNOWN] = 1 if known else 0
+        cut_part(own, count, left, with_slopes, known)
         count += 2
     if data.shape[2] > 1:  # the mean times how the duration moves
         for j in range(data.shape[0]):
@@ -162,13 +208,16 @@ def enter_segment(functions, whole, i, z, turn, joint, p, own):  # type: ignore[
 
 
 @helper
-def least_sizes(course, own, whole):  # type: ignore[no-untyped-def]
-    """Write the values over a segment, and let the sizes below which they are rounding grow to theirs.
+def least_sizes(course, layout, i, d_period, own, whole):  # type: ignore[no-untyped-def]
+    """Write the values over segment i, and let the sizes below which they are rounding grow to theirs.
 
     False if a noted argument changes its sign there.
     """
-    own.light.after[0] = -1.0
-    smooth = sample_part(course, 0.0, 1.0, own, own.light, whole)
+    own.light.after[0], own.exact.after[0] = -1.0, -1.0
+    if whole.shape[2] > 1:
+        smooth = sample_at_once(course, layout, i, d_period, own, whole)
+    else:
+        smooth = sample_part(course, 0.0, 1.0, own, own.light, whole)
     for j in range(own.least.shape[0]):
         for k in range(NODES):
             size = abs(whole[j, k, 0]) * (ROUNDING / RESOLVED)
@@ -213,7 +262,8 @@ def integrate(  # type: ignore[no-untyped-def]
     m, free, exact, whole = z.shape[1], which.shape[0], on_joints.shape[0] > 0, extreme.whole
     length, columns = whole.modes.shape[0], 3 + m + free if exact else 1
     d_period, none, turn = np.zeros(free), np.empty(0, dtype=np.int64), 0.0
-    own = integral_workspace(tape, length, m, p.shape[0], which, none, exact, columns)
+    images = z.shape[0] if exact and length > z.shape[0] else 0
+    own = integral_workspace(tape, length, m, p.shape[0], which, none, images, columns)
     orbit = extreme_workspace(length, m, min(length, 0))
     fill_cycle(functions, layout, extreme, z, p, orbit)
     if layout.turn != 0.0:
@@ -231,7 +281,7 @@ def integrate(  # type: ignore[no-untyped-def]
         if not lasts > 0.0:
             continue
         if k < length:
-            if not least_sizes(course, own, own.wholes[i]):
+            if not least_sizes(course, layout, i, d_period, own, own.wholes[i]):
                 return False
             continue
         if not over_segment(course, level, own, own.wholes[i]):

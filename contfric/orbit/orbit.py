@@ -320,7 +320,7 @@ class Orbit(MeasuredOrbit):
     @property
     def name(self) -> str:
         """Name as in the reference: number of sticks, s or a, and segments if not 6."""
-        return self.signature.auto_name(self.symmetric)
+        return str(self.signature.name)
 
     @cached_property
     def stops(self) -> FloatArray:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from contfric.models.definition import Domain, FloatArray
+from contfric.models.definition import Domain, FloatArray, Model
 from contfric.orbit.itineraries import decode, end_domain, passed_domains
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
@@ -32,8 +33,14 @@ def read_signature(orbit: Orbit, labels: IntArray) -> Signature:
     """
     model, system = orbit.model, orbit.system
     names = system.domains or _domains(orbit, labels)  # in full form each segment is one of them
-    plain = Signature(model, tuple(names), orbit.periods, symmetric=orbit.symmetric)
-    return replace(plain, name=plain.auto_name(orbit.symmetric))
+    return _called(model, tuple(names), orbit.periods, orbit.symmetric)
+
+
+@lru_cache(maxsize=1024)
+def _called(model: Model, names: tuple[str, ...], periods: int, symmetric: bool) -> Signature:
+    """Return a signature with its name: orbits of one diagram, or of many, share few of them."""
+    plain = Signature(model, names, periods, symmetric=symmetric)
+    return replace(plain, name=plain.auto_name(symmetric))
 
 
 def segment_domains(orbit: Orbit, labels: IntArray) -> list[list[str]]:

@@ -28,7 +28,7 @@ _BEYOND = 1.01
 
 def creeps(trajectory: Trajectory, lag: int) -> bool:
     """Tell whether the last events are those of an itinerary in which something only grows."""
-    return bool(only_grows(trajectory.model, trajectory.itinerary[-lag:]))
+    return bool(only_grows(trajectory.model, trajectory.itinerary_from(-lag)))
 
 
 def beyond_creep(trajectory: Trajectory, lag: int) -> tuple[float, FloatArray] | None:
@@ -38,7 +38,7 @@ def beyond_creep(trajectory: Trajectory, lag: int) -> tuple[float, FloatArray] |
     ----------
     lag : events after which the solution nearly returns
     """
-    model, itinerary = trajectory.model, trajectory.itinerary[-lag:]
+    model, itinerary = trajectory.model, trajectory.itinerary_from(-lag)
     modes = only_grows(model, itinerary)
     if len(trajectory) < 4 * lag + 1 or not modes:
         return None

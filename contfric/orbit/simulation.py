@@ -130,9 +130,13 @@ class Trajectory(Shown):
     @property
     def itinerary(self) -> tuple[tuple[str, str], ...]:
         """The (mode, exit surface) pairs of the segments that ended."""
+        return self.itinerary_from(0)
+
+    def itinerary_from(self, first: int) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of :attr:`itinerary` from one on: of a long solution the last ones are wanted."""
         modes = [m.name for m in self.model.modes]
         surfaces = [s.name for s in self.model.surfaces]
-        pairs = zip(self.modes.tolist(), self.exits.tolist(), strict=True)
+        pairs = zip(self.modes[first:].tolist(), self.exits[first:].tolist(), strict=True)
         return tuple((modes[m], surfaces[k]) for m, k in pairs)
 
     word = renamed("word", "itinerary")

@@ -72,10 +72,10 @@ def stands_still(orbit: Orbit, i: int) -> bool:
     The solution is the same as at rest. What moves and comes back to where it began is elsewhere in between.
     """
     begin, end = orbit.begins[i], orbit.ends[i]
-    if orbit.model.autonomous or np.max(np.abs(end[1:] - begin[1:])) >= SAME_SOLUTION:
+    if orbit.model.autonomous or np.abs(end[1:] - begin[1:]).max() >= SAME_SOLUTION:
         return False
     inside = state_within(orbit, i, _INSIDE * float(end[0] - begin[0]))
-    return bool(np.max(np.abs(inside - begin[1:])) < SAME_SOLUTION)
+    return bool(np.abs(inside - begin[1:]).max() < SAME_SOLUTION)
 
 
 def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False) -> bool:
