@@ -92,8 +92,8 @@ def test_files_of_events(tmp_path: Path) -> None:
     whole = {"certificate": "diagram", "checkable": [data]}
     assert check_text(json.dumps(whole)).statements[:3] == ("1 events", "0 orbits", "0 tubes")
     data["value"] = data["value"].replace("0.5419", "0.5418")
-    assert not check_text(json.dumps(several | {"checkable": [data]})).yes
-    nested = {"certificate": "diagram", "checkable": [several]}
+    assert not check_text(json.dumps(whole | {"checkable": [data]})).yes
+    nested = {"certificate": "diagram", "checkable": [whole]}
     assert not check_text(json.dumps(nested)).yes
 
 
