@@ -394,7 +394,7 @@ def test_wrong_joints_are_refuted() -> None:
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_flows_by_the_parameter_from_rows_of_states_only(count: int) -> None:
-    """They are those of the whole block matrix, which other rows that depend on the parameter still ask for."""
+    """They are those of the whole block matrix, also where other rows depend on the parameter."""
     rng, size, states = np.random.default_rng(count), 5, 2
     field, *others = rng.normal(size=(count, size, size))
     field[states:, :states] = 0
