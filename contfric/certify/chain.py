@@ -104,25 +104,40 @@ class Move:
     speed: arb_mat
 
 
-def block_exponential(terms: list[arb_mat], duration: arb) -> list[arb_mat]:
+def block_exponential(terms: list[arb_mat], duration: arb, states: int) -> list[arb_mat]:
     """Return Taylor's coefficients by the parameter of exp(M d) from those of M.
+
+    Mostly the harmonics depend neither on the states nor, in phases, on the parameter: then the coefficients
+    of M have rows of states only, and so have those of the flow. Of all blocks but the last one the states
+    are enough.
 
     Parameters
     ----------
     terms : M, M_p, M_pp / 2, ...
+    states : how many of the rows are states
     """
     size, count = terms[0].nrows(), len(terms)
-    block = zeros(count * size, count * size)
+    n = states if _moves_states_only(terms, states) else size
+    last, whole = n * (count - 1), zeros(n * (count - 1) + size, n * (count - 1) + size)
     for k in range(count):
         for j in range(k, count):
-            for a in range(size):
-                for b in range(size):
-                    block[k * size + a][j * size + b] = terms[j - k][a, b]
-    whole = (arb_mat(block) * duration).exp()
-    return [
-        arb_mat([[whole[a, k * size + b] for b in range(size)] for a in range(size)])
-        for k in range(count)
-    ]
+            rows, columns = (n, size)[k + 1 == count], (n, size)[j + 1 == count]
+            for a in range(rows):
+                for b in range(columns):
+                    whole[k * n + a][j * n + b] = terms[j - k][a, b]
+    flow = (arb_mat(whole) * duration).exp().tolist()
+    found = [arb_mat([row[last:] for row in flow[last:]])]
+    for k in range(count - 2, -1, -1):
+        rest = zeros(size - n, size)
+        found.append(arb_mat([row[last:] for row in flow[k * n : (k + 1) * n]] + rest))
+    return found
+
+
+def _moves_states_only(terms: list[arb_mat], states: int) -> bool:
+    """Tell whether states do not drive the other rows, and only rows of states depend on the parameter."""
+    first, *others = (term.tolist()[states:] for term in terms)
+    driven = any(not x.is_zero() for row in first for x in row[:states])
+    return not driven and all(x.is_zero() for rows in others for row in rows for x in row)
 
 
 class Chain:
@@ -297,7 +312,7 @@ class Chain:
         if all(x.is_zero() for x in slope.entries()):  # rest, in phases
             flow = slope
         else:
-            flow = block_exponential([model.fields[mode], slope], duration)[1]
+            flow = block_exponential([model.fields[mode], slope], duration, self.n)[1]
         start = column(model.by_parameter(joint[0], 0))
         if move.reset is not None:
             before = column(model.extended(joint[0], joint[1:]))

@@ -238,12 +238,12 @@ class Ray:
         assert central is not None
         assert wide is not None
         narrow = [self.central.fields[mode], central.fields[mode]]
-        at, at_by = block_exponential(narrow, duration)
+        at, at_by = block_exponential(narrow, duration, self.n)
         if wide.slopes is None:
-            change = block_exponential([field, by], duration)[1]
+            change = block_exponential([field, by], duration, self.n)[1]
             return self._by_parameter(at, at_by, change), self._split(change)
         terms = [field, by, wide.slopes.fields[mode] / 2]
-        _, change, bend = block_exponential(terms, duration)
+        _, change, bend = block_exponential(terms, duration, self.n)
         bend = bend * 2
         return self._by_parameter(at, at_by, change), self._by_parameter(at_by, bend.mid(), bend)
 

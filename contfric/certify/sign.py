@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat
@@ -38,6 +39,13 @@ _MOST = 4000
 _NARROW = 80
 #: Halvings of a segment in which a touch is looked for.
 _WINDOW = 10
+
+
+class Derivatives(NamedTuple):
+    """An observable and its derivatives, a row each, and the norm of the row that follows them."""
+
+    rows: arb_mat
+    last: arb
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +79,10 @@ class Path:
         return {}
 
     @cached_property
+    def _growths(self) -> dict[int, arb]:
+        return {}
+
+    @cached_property
     def _sizes(self) -> dict[tuple[int, int], arb]:
         return {}
 
@@ -89,12 +101,21 @@ class Path:
             self._sizes[level, index] = max(((x / d).abs_upper() for x, d in entries), key=float)
         return self._sizes[level, index]
 
-    def derivatives(self, row: arb_mat) -> list[arb_mat]:
-        """Return the rows of an observable and of its derivatives, each over its factorial."""
+    def derivatives(self, row: arb_mat) -> Derivatives:
+        """Return an observable and its derivatives, each over its factorial, and the norm of the last one."""
         found = [row]
         for k in range(1, _TERMS + 1):
             found.append(found[-1] * self.field / k)
-        return found
+        last = zip(found[_TERMS].entries(), self.weights, strict=True)
+        total = sum((x.abs_upper() * d for x, d in last), arb(0))
+        return Derivatives(arb_mat([r.entries() for r in found[:_TERMS]]), total)
+
+    def growth(self, level: int) -> arb:
+        """Return a bound of how much a state grows in half a piece, times the last power of that time."""
+        if level not in self._growths:
+            half = (self.duration / 2 ** (level + 1)).upper()
+            self._growths[level] = (self.norm * half).exp() * half**_TERMS
+        return self._growths[level]
 
 
 def balanced(moduli: np.ndarray) -> np.ndarray:
@@ -111,17 +132,15 @@ def balanced(moduli: np.ndarray) -> np.ndarray:
     return d
 
 
-def range_over(path: Path, rows: list[arb_mat], level: int, index: int) -> arb:
+def range_over(path: Path, derivatives: Derivatives, level: int, index: int) -> arb:
     """Return an enclosure of an observable over piece ``index`` of 2^level, from its derivatives."""
     half = (path.duration / 2 ** (level + 1)).upper()
-    state = path.middle(level, index)
-    size = path.size(level, index)
-    last = zip(rows[_TERMS].entries(), path.weights, strict=True)
-    total = sum((x.abs_upper() * d for x, d in last), arb(0))
-    spread = total * (path.norm * half).exp() * size * half**_TERMS
-    for k in range(_TERMS - 1, 0, -1):
-        spread += (rows[k] * state)[0, 0].abs_upper() * half**k
-    return (rows[0] * state)[0, 0] + arb(0, spread.upper())
+    value, *others = (derivatives.rows * path.middle(level, index)).entries()
+    spread = arb(0)
+    for other in reversed(others):
+        spread = (spread + other.abs_upper()) * half
+    spread += derivatives.last * path.growth(level) * path.size(level, index)
+    return value + arb(0, spread.upper())
 
 
 def positive(

@@ -31,6 +31,8 @@ HALVINGS = 12
 #: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
 #: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
 _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
+#: After so many boxes it is tried again whether they are found at once, by the half-widths of the last one.
+_AGAIN = 8
 #: Most parts of a box in which its inequalities are looked at.
 _PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
@@ -155,7 +157,10 @@ class Tracer(Strand):
             if halves is not None:
                 return halves
         self.count += 1
-        box = box_between(self.segments, self.build, first, last)
+        last_box = self.last if isinstance(self.last, Box) else None
+        tries = last_box is not None and (last_box.at_once or self.count % _AGAIN == 0)
+        like = last_box if tries else None
+        box = box_between(self.segments, self.build, first, last, like)
         admissible = NO_BOX if box is None else self.admissible(box)
         refuted = admissible.verdict is Verdict.REFUTED  # by all orbits of the box
         piece = None

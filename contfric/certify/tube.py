@@ -39,6 +39,8 @@ from contfric.models.definition import FloatArray
 OVERLAP = 0.02
 #: Half-widths of a box in units of what would suffice if it were narrow, and how often others are tried.
 _MORE, _TRIES = 1.3, 3
+#: How much wider than the last box the next one may be: the Jacobian is looked at in that.
+_NEAR = 2.0
 #: Most steps of Newton's method, and how much smaller a correction is to be for a Jacobian to be kept.
 _NEWTON, _FAST = 10, 0.05
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
@@ -59,6 +61,7 @@ class Box:
     no_flip : whether no multiplier of a turn is -1 in it
     linear : the Jacobian over the box
     bounds : what is left over of it by the preconditioner
+    at_once : whether it was found in one go, by the half-widths of another one
     """
 
     first: Vector
@@ -70,6 +73,7 @@ class Box:
     no_flip: bool
     linear: Linear
     bounds: Bounds
+    at_once: bool = False
 
     @property
     def monotone(self) -> bool:
@@ -130,8 +134,15 @@ def solved(
     return None
 
 
-def box_between(segments: Segments, build: Builder, first: Vector, last: Vector) -> Box | None:
-    """Return the box between two orbits of a curve, or None if it is not proved."""
+def box_between(
+    segments: Segments, build: Builder, first: Vector, last: Vector, like: Box | None = None
+) -> Box | None:
+    """Return the box between two orbits of a curve, or None if it is not proved.
+
+    Parameters
+    ----------
+    like : a box of the curve nearby: one whose half-widths are as large for its length is tried first
+    """
     difference = [(b - a).mid() for a, b in zip(first, last, strict=True)]
     square = sum((c * c for c in difference), arb(0))
     if not square > 0:
@@ -145,12 +156,36 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
         chord = Chord(middle, difference, [arb(r) for r in radii], half)
         return Ray(segments, central, build(chord.box[-1]), chord).linear()
 
+    def box(radii: FloatArray, found: Linear, bounds: Bounds, at_once: bool = False) -> Box:
+        return Box(
+            first,
+            last,
+            normal,
+            [around(c, arb(r)) for c, r in zip(line, radii, strict=True)],
+            [arb(r) for r in radii],
+            bounds.solution(),
+            regular_along(squared(found, -1), 0.5 + OVERLAP),
+            found,
+            bounds,
+            at_once,
+        )
+
+    least = np.array([_LEAST * float(1 + m.abs_upper()) for m in middle])
+    if like is not None:  # in one go, if the curve bends as there
+        wide = _scaled(like, square)
+        found = linear(wide)
+        bounds = Bounds.of(_bordered(found, normal), 0.5 + OVERLAP)
+        if bounds is not None:
+            moved = bounds.moved([*found.residual, arb(0)], difference)
+            wanted = supersolution(bounds.gap, moved)
+            radii = wide if wanted is None else _MORE * wanted + least
+            if np.all(radii <= wide) and _contracts(bounds, radii, moved):
+                return box(radii, found, bounds, True)
     found = linear(np.zeros(len(middle)))  # on the chord itself
     straight = Bounds.of(_bordered(found, normal), 0.5 + OVERLAP)
     if straight is None:
         return None
     moved = straight.moved([*found.residual, arb(0)], difference)
-    least = np.array([_LEAST * float(1 + m.abs_upper()) for m in middle])
     bounds = straight
     for _ in range(_TRIES):
         wanted = supersolution(bounds.gap, moved)
@@ -159,19 +194,25 @@ def box_between(segments: Segments, build: Builder, first: Vector, last: Vector)
         radii = _MORE * wanted + least
         found = linear(radii)
         bounds = straight.over(_bordered(found, normal))
-        if np.all((bounds.gap @ radii + moved) * (1 + 1e-9) < radii):
-            return Box(
-                first,
-                last,
-                normal,
-                [around(c, arb(r)) for c, r in zip(line, radii, strict=True)],
-                [arb(r) for r in radii],
-                bounds.solution(),
-                regular_along(squared(found, -1), 0.5 + OVERLAP),
-                found,
-                bounds,
-            )
+        if _contracts(bounds, radii, moved):
+            return box(radii, found, bounds)
     return None
+
+
+def _contracts(bounds: Bounds, radii: FloatArray, moved: FloatArray) -> bool:
+    return bool(np.all((bounds.gap @ radii + moved) * (1 + 1e-9) < radii))
+
+
+def _scaled(like: Box, square: arb) -> FloatArray:
+    """Return half-widths as those of another box, which are of second order in its length, and a little more.
+
+    Parameters
+    ----------
+    square : of the length that they are wanted for
+    """
+    before = sum(((b - a).mid() ** 2 for a, b in zip(like.first, like.last, strict=True)), arb(0))
+    ratio = float((square / before).mid())
+    return _NEAR * ratio * np.array([float(r.abs_upper()) for r in like.radii])
 
 
 def _bordered(found: Linear, normal: Vector) -> list[arb_mat]:

@@ -38,6 +38,8 @@ _MOST = 20_000
 #: How much longer than the last box that was decided the next one is: after some in a row, and before; and
 #: how much shorter if one is not.
 _STEADY, _GROWTH, _SLOW, _SHORTER = 8, 1.3, 1.04, 0.75
+#: How much longer than all before a box may be, over boxes of the proof, where each was decided.
+_REACH = 2.5
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
 #: distance from there.
 _BORN = 0.02
@@ -64,6 +66,7 @@ class _GrowingTube:
         self.rows, self.kinds, self.ends = [start], list[list[str]](), list[Any]([None, None])
         self.point: Box | None = None
         self.tried, self.length, self.steady, self.why = 0, math.inf, _STEADY, ""
+        self.longest = 0.0  # box that was decided
 
     def may_try(self) -> bool:
         """Tell whether there is time for another box; else say what ended the work."""
@@ -86,6 +89,7 @@ class _GrowingTube:
         except (Refused, Undecided, ArithmeticError, ValueError) as error:
             self.why = str(error)
             return False
+        self.longest = max(self.longest, math.dist(self.rows[-1], row))
         self.kinds.append([kind for kind in kinds if not end or kind != end[0]])
         self.rows.append(row)
         self.point, self.why = last, ""
@@ -164,16 +168,15 @@ def tubes_of(proof: BranchCertificate, until: float = math.inf) -> list[dict[str
 
 
 def _runs(proof: BranchCertificate, until: float) -> list[_GrowingTube]:
-    branch, runs, run = proof.branch, list[_GrowingTube](), None
-    size = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1
-    kept = _kept(branch)
-    for k, piece in enumerate(proof.pieces):
-        known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
-        known = known and kept[0] <= piece.start and piece.stop <= kept[1]
-        if not known:
+    runs, run = list[_GrowingTube](), None
+    rows = _rows_of(proof)
+    for k, (piece, ends) in enumerate(zip(proof.pieces, rows, strict=True)):
+        if ends is None:
             run = None
             continue
-        a, b = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)
+        a, b = ends
+        if run is not None and piece.linked and _goes_further(proof, rows, k, run):
+            continue
         if piece.ends and k == 0:
             run = _from_end(proof, b, a, until)
         else:
@@ -184,6 +187,34 @@ def _runs(proof: BranchCertificate, until: float) -> list[_GrowingTube]:
             runs.append(run)
         run = None if run is None or run.why or run.ends[1] else run
     return runs
+
+
+def _rows_of(proof: BranchCertificate) -> list[tuple[_Row, _Row] | None]:
+    """Return the knots at the ends of each box of the proof; None for a box that is not in the file."""
+    branch = proof.branch
+    size, kept = len(branch.system.itinerary) * branch[0].joints.shape[1] + 1, _kept(branch)
+    found: list[tuple[_Row, _Row] | None] = []
+    for piece in proof.pieces:
+        known = piece.proved and bool(piece.knots) and len(piece.knots[0]) == size
+        known = known and kept[0] <= piece.start and piece.stop <= kept[1]
+        knots = ([*unknowns_of(c[:-1].tolist()), float(c[-1])] for c in piece.knots)
+        found.append(tuple(knots) if known else None)  # type: ignore[arg-type]
+    return found
+
+
+def _goes_further(
+    proof: BranchCertificate,
+    rows: list[tuple[_Row, _Row] | None],
+    k: int,
+    run: _GrowingTube,
+) -> bool:
+    """Tell whether a box of the checker may reach over a whole box of the proof into the next one."""
+    after = proof.pieces[k + 1] if k + 1 < len(rows) else None
+    ends = rows[k + 1] if after is not None and after.linked and not after.ends else None
+    if ends is None or proof.pieces[k].ends:
+        return False
+    most = run.length if run.length < math.inf else _REACH * run.longest
+    return math.dist(run.rows[-1], ends[1]) < most
 
 
 def _kept(branch: Branch) -> tuple[float, float]:

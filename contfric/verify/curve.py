@@ -1,8 +1,7 @@
 """Pieces of a curve of orbits: each in a box, with what the law of friction says over all of it.
 
-Orbits of a box are c(s) + y, c a line, |s| <= 1/2, |y| <= r, and ``b y = 0``: the parameter is kept, or
-near a fold y is normal to c. With C near the inverse of J, the Jacobian of F and b, ``y - C F(c + y)``
-contracts |y| <= r if ``|1 - C J| r + |C F(c)| < r``, and J y' = -dF(c + y)/ds is known.
+Orbits of a box are c + y, c(s) a line, |y| <= r, ``b y = 0`` (b keeps the parameter, or is along c).
+With C near the inverse of J, that of F and b, ``y - C F(c + y)`` contracts if ``|1 - C J| r + |C F(c)| < r``.
 """
 
 from __future__ import annotations
@@ -39,8 +38,8 @@ class Box:
             if not left or max(size(f).entries(), key=float) < arb(2) ** -(9 * ctx.prec // 10):
                 break
             self.middle = (self.middle - self.inverse * f).mid()  # a step of Newton's method
-        parts = [f, self.rates(arb(0), 1), self.rates(INSIDE, 2)][: 1 if self.newton else 3]
-        off = sum((HALF**k * size(self.inverse * v) for k, v in enumerate(parts)), 0 * f)
+        more = () if self.newton else (self.rates(arb(0), 1), self.rates(INSIDE, 2))
+        off = sum((HALF**k * size(self.inverse * v) for k, v in enumerate((f, *more))), 0 * f)
         least = column([arb(2) ** -((8 if self.newton else 6) * ctx.prec // 10)] * len(f.entries()))
         self.radii = column(radii) + least if radii else size(2 * off + least)
         for _ in range(1 if radii else 4):
@@ -84,8 +83,8 @@ class Box:
         scene, z = point.orbits(0)
         off = column([*z, scene.value]) - self.middle
         s = (self.border * off)[0, 0] / (self.border * self.along)[0, 0]
-        margins = (self.radii - size(off - s * self.along)).entries()
-        return abs(s) < HALF and all(margin > 0 for margin in margins)
+        left = self.radii - size(off - s * self.along)
+        return abs(s) < HALF and all(margin > 0 for margin in left.entries())
 
     def events(self, first: Box, last: Box) -> list[str]:
         """Return which multipliers pass the circle between two orbits, once each: their rates have a sign."""

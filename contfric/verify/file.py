@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise, permutations
+from itertools import combinations, pairwise, permutations
 from typing import Any, NamedTuple
 
 from flint import acb, arb, ctx
@@ -11,8 +11,7 @@ from flint import acb, arb, ctx
 from contfric.verify.curve import INSIDE, Box, check_admissible, met_in
 from contfric.verify.motion import Refused, Scene, Undecided, ball, see
 
-BITS = (106, 212, 424, 848)  # asked for one after the other, until all is decided
-FORMAT, CHECKED_MODELS = 2, ("coulomb",)
+FORMAT, CHECKED_MODELS, BITS = 2, ("coulomb",), (106, 212, 424, 848)  # until all is decided
 CLAIMS = "exists", "unique", "admissible", "stable", "unstable"  # of an orbit
 
 
@@ -35,7 +34,10 @@ def check_text(text: str) -> Answer:
         moved = {k for p in parts[1:] for k, v in p["params"].items() if v != parts[0]["params"][k]}
         moved |= {p["parameter"] for p in parts if "parameter" in p}
         see(len(moved) < 2, "its parts are of one diagram")
-        stated, bits = zip(*map(_check, parts), strict=True)
+        stated, orbits, bits = zip(*map(_check, parts), strict=True)
+        for (p, *own), (q, *others) in combinations(orbits, 2):
+            apart = p != q or any(all(s.misses(z, b) for b in others) for s, z in own)
+            see(apart, "no two parts are the same")
         counts = [f"{sum(p['certificate'] == name for p in parts)} {name}s" for name in CHECKS]
         counts += [f"{sum(p.get('ends', []).count(None) for p in parts)} open ends"]
         return Answer(True, "", tuple(stated[0] if parts == [data] else counts), max(bits))
@@ -45,14 +47,14 @@ def check_text(text: str) -> Answer:
         ctx.cap = cap
 
 
-def _check(data: Any) -> tuple[list[str], int]:
-    check, why = CHECKS.get(data["certificate"]), ""
-    if check is None or data.get("format") != FORMAT or data.get("model") not in CHECKED_MODELS:
-        raise Refused(f"it is no certificate of format {FORMAT} of {', '.join(CHECKED_MODELS)}")
-    for bits in BITS[data["certificate"] != "tube" :]:
+def _check(data: Any) -> tuple[list[str], list[Any], int]:
+    name, why = data["certificate"], ""
+    known = name in CHECKS and data.get("format") == FORMAT and data.get("model") in CHECKED_MODELS
+    see(known, f"it is a certificate of format {FORMAT} of {', '.join(CHECKED_MODELS)}")
+    for bits in BITS[name != "tube" :]:
         with ctx.workprec(bits):
             try:
-                return check(data), bits
+                return *CHECKS[name](data), bits
             except (Undecided, ZeroDivisionError) as error:
                 why = str(error)
     raise Refused(f"not decided with {BITS[-1]} bits: {why}")
@@ -80,9 +82,9 @@ def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], Box]
     return box.events(a, b) + ([end[0]] if end else []), box
 
 
-def _check_tube(data: Any) -> list[str]:
+def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
     points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Box]()
-    stop, (scene, start) = len(points) - 2, points[0].orbits(0)
+    stop, ends = len(points) - 2, [points[k].orbits(0) for k in (0, -1)]
     see(stop >= bool(left and right) and "T" not in f"{left}{right}", "a tube may have such ends")
     for k, (a, b) in enumerate(pairwise(points)):
         first, last, end = (b, a, left) if left and k == 0 else (a, b, right if k == stop else None)
@@ -93,23 +95,22 @@ def _check_tube(data: Any) -> list[str]:
         turn, pairs = -1 if left and k == 1 else 1, permutations((boxes[k - 1], box))
         goes = [(p.border * p.along * p.border * q.slope)[0, 0] * turn for p, q in pairs]
         see(max(goes, key=arb.lower), "it goes on and does not turn back")
-        low, high = (scene.value - point.orbits(0)[0].value for point in (a, b))
-        past = (box.fixed and low * high > 0) or Scene.misses(*box.orbits(INSIDE), start)
-        see(k == 0 or past, "the first orbit does not come again", False)
+        past = k == 0 or Scene.misses(*box.orbits(INSIDE), ends[0])
+        see(past or INSIDE * (not box.holds(points[0])), "the first orbit does not come again")
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
-    return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"]
+    return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"], ["", *ends]
 
 
-def _check_event(data: Any) -> list[str]:
+def _check_event(data: Any) -> tuple[list[str], list[Any]]:
     kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
     found, box = events_between(data, a, b, None if at is None else (kind, [at]))
     see(found == [kind], f"it has those events, not {found}")
-    see(value.rad() - abs(box.orbits(INSIDE)[0].value - value.mid()), "it is within the ball")
-    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"]
+    see(value.rad() - abs((near := box.orbits(INSIDE))[0].value - value.mid()), "it is in the ball")
+    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"], [kind, near]
 
 
-def _check_orbit(data: Any) -> list[str]:
+def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"]
     see({"exists"} <= set(claims) <= set(CLAIMS), "its statements are those of an orbit")
     printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
@@ -130,7 +131,7 @@ def _check_orbit(data: Any) -> list[str]:
     discs = [acb(ball(disc["re"]), ball(disc["im"])) for disc in data["multipliers"]]
     pairs = zip(discs, found, strict=bool(discs))
     see(all(disc.contains(mu) for disc, mu in pairs), "the multipliers lie in their discs", False)
-    return [c for c in CLAIMS if c in claims] + ["multipliers"] * bool(discs)
+    return [*claims, *["multipliers"] * bool(discs)], [data["params"], (scene, z)]
 
 
 CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}

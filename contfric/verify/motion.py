@@ -12,7 +12,6 @@ from typing import Any
 
 from flint import acb, acb_series, arb, arb_series
 
-#: Direction and exit: (1 or -1, 0) of a slide, (0, 1 or -1) of a stick that ends at +-S0.
 SEGMENTS = {"slide+ v": (1, 0), "slide- v": (-1, 0), "stick F+": (0, 1), "stick F-": (0, -1)}
 PARAMETERS, J, NEAR = ("Omega", "S", "S0", "h", "zeta"), acb(0, 1), 0.4  # to resonance
 _NUMBER = r"\d{1,99}([.]\d{1,99})?(e[+-]?\d{1,4})?"
@@ -29,9 +28,9 @@ class Undecided(Exception):
 def ball(value: Any) -> arb:
     """Return a number of a file, or the ball of a text such as ``1.25 +/- 1e-30``."""
     text = isinstance(value, str) and re.fullmatch(f"(-?{_NUMBER} )?[+]/- {_NUMBER}", value)
-    if not text and (type(value) not in (int, float) or not arb(value).is_finite()):
-        raise Refused(f"{str(value)[:40]!r} is no number, and no ball such as '1.25 +/- 1e-30'")
-    return arb(value)
+    if text or (type(value) in (int, float) and arb(value).is_finite()):
+        return arb(value)
+    raise Refused(f"{str(value)[:40]!r} is no number, and no ball such as '1.25 +/- 1e-30'")
 
 
 def see(so: Any, what: str, sure: bool = True) -> None:
@@ -75,7 +74,7 @@ class Scene:
         self.square = 1 - self.zeta * self.zeta
         self.root = (self.square if part(self.square, 0) > 0 else acb(1) * self.square).sqrt()
         self.turn, self.closing = periods * arb.pi() * (1 if self.half else 2), 1 - 2 * self.half
-        self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]
+        self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]  # direction, exit
 
     def force(self, phase: Any) -> list[Any]:
         """Return f with three derivatives by time."""
@@ -120,11 +119,12 @@ class Scene:
         """Return joint i, the last one by periodicity or symmetry."""
         return z[2 * i :][:2] if i < self.count else (z[0] + self.turn, self.closing * z[1])
 
-    def misses(self, z: list[Any], stop: Any = None) -> bool:
-        """Tell whether no joint is a given one, or no other one the first, whole periods of f apart."""
-        (t, y, *_), joints = stop or z, [self.joint(z, i) for i in range(self.count)]
+    def misses(self, z: list[Any], other: Any = None) -> bool:
+        """Tell whether no joint is the first one of another orbit, or its own, whole periods of f apart."""
+        (t, y, *_), joints = (other or (0, z))[1], [self.joint(z, i) for i in range(self.count)]
         joints += [(phase + self.turn, -x) for phase, x in joints] * self.half
-        return all(abs(((p - t) / 2).sin()) + abs(x - y) > 0 for p, x in joints[not stop :])
+        apart = all(abs(((p - t) / 2).sin()) + abs(x - y) > 0 for p, x in joints[not other :])
+        return apart or bool(other and other[0].value != self.value)
 
     def duration(self, z: list[Any], i: int) -> Any:
         """Return how long segment i lasts."""

@@ -12,7 +12,7 @@ from flint import arb, arb_mat, ctx
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.certify.chain import Chain, segments_of
+from contfric.certify.chain import Chain, block_exponential, segments_of
 from contfric.certify.circle import no_pair
 from contfric.certify.events import _resonates
 from contfric.certify.extended import (
@@ -390,3 +390,19 @@ def test_wrong_joints_are_refuted() -> None:
     found = certify_orbit(moved)
     assert found.exists.verdict is Verdict.REFUTED
     assert not found.proved
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_flows_by_the_parameter_from_rows_of_states_only(count: int) -> None:
+    """They are those of the whole block matrix, also where other rows depend on the parameter."""
+    rng, size, states = np.random.default_rng(count), 5, 2
+    field, *others = rng.normal(size=(count, size, size))
+    field[states:, :states] = 0
+    for rows in (states, size):
+        terms = [arb_mat(field.tolist())]
+        terms += [arb_mat((m * (np.arange(size) < rows)[:, None]).tolist()) for m in others]
+        found = block_exponential(terms, arb(1.3), states)
+        whole = block_exponential(terms, arb(1.3), size)
+        for one, other in zip(found, whole, strict=True):
+            for a, b in zip(one.entries(), other.entries(), strict=True):
+                assert abs(a - b) < 1e-9

@@ -7,6 +7,7 @@ that 60 digits of brute force (``tests/certificate_oracle.py``) agree with.
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import replace
 from functools import cache
@@ -93,6 +94,26 @@ def test_a_name_that_comes_twice_is_refused() -> None:
         other = text.replace(f'"{name}": ', f'"{name}": 0, "{name}": ', 1)
         assert json.loads(other) == json.loads(text)
         assert "names come once" in check_text(other).why
+
+
+def test_two_parts_of_a_file_are_not_the_same() -> None:
+    """Nor from another joint, a period later, or under another name; two orbits may be."""
+    part, other = (json.loads(certificate(index)) for index in (0, 1))
+    assert part["params"] == other["params"]
+    later = part | {"statements": ["exists"], "multipliers": []}
+    period = 2 * math.pi / part["params"]["Omega"]
+    joints = [(t, x) for t, x in zip(part["joints"][::2], part["joints"][1::2], strict=True)]
+    joints = [*joints[1:], (joints[0][0] + period, joints[0][1])]
+    later["joints"] = [c + period * (k % 2 == 0) for k, c in enumerate(sum(joints, ()))]
+    later["segments"] = [*part["segments"][1:], part["segments"][0]]
+    later["radius"] = [1e-9] * len(later["joints"])
+    later["enclosure"] = [f"{c!r} +/- 1e-9" for c in later["joints"]]
+    for again in (part, later, part | {"kind": "SN", "parameter": "S"}, other):
+        assert check_text(json.dumps(again)).yes
+        text = json.dumps({"certificate": "diagram", "format": 1, "checkable": [part, again]})
+        answer = check_text(text)
+        assert answer.yes == (again is other), answer
+        assert answer.yes or answer.why == "false: no two parts are the same"
 
 
 @pytest.mark.slow

@@ -50,6 +50,24 @@ def test_a_tube_with_a_fold_and_two_ends_is_verified() -> None:
     assert {"one curve", "admissible", "1 events of multipliers"} <= set(answer.statements)
 
 
+def test_a_tube_is_not_stated_twice() -> None:
+    """Nor in the other direction, with other knots at which its orbits are the same."""
+    data = fold()
+    last = len(data["knots"]) - 2
+    back: dict[str, Any] = {
+        "knots": [
+            [c + 1e-12 * (k % 3) for k, c in enumerate(row[:-1])] + row[-1:]
+            for row in data["knots"][::-1]
+        ],
+        "ends": data["ends"][::-1],
+        "events": [[last - k, kind] for k, kind in data["events"]],
+    }
+    assert is_verified(data | back)
+    for other in ({}, back):
+        parts = {"certificate": "diagram", "format": 1, "checkable": [data, data | other]}
+        assert check_text(json.dumps(parts)).why == "false: no two parts are the same"
+
+
 @pytest.mark.parametrize(
     ("name", "omega", "span", "kinds", "ends"),
     [
@@ -277,7 +295,7 @@ def test_a_tube_goes_round_a_closed_curve_once(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(tube_file, "_kept", lambda branch: (branch.arc[0], branch.arc[-1]))
     (again,) = tubes_of(proof)  # its last point is beyond its first one
     assert data["knots"][:-1] == again["knots"][: len(data["knots"]) - 1]
-    assert not is_verified(again)
+    assert check_text(json.dumps(again)).why == "false: the first orbit does not come again"
     turns = {"knots": [*again["knots"][-8:], *again["knots"][1:]], "events": again["events"]}
     assert not is_verified(again | turns)
 
