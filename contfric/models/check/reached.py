@@ -1,0 +1,51 @@
+"""Whether motion comes to states at which a model is at fault: asked of a few simulations.
+
+States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
+simulation meets a fault; else it is a warning, with the region that was looked at.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contfric.errors import ContfricError
+from contfric.models.check.probe import Probe
+from contfric.models.check.report import ModelReport, Topic
+
+#: Simulations: one from the start by default, and from states that are drawn in the region.
+_STARTS = 12
+#: Periods (units of time without an excitation) and events of each: transients are what is asked for.
+_PERIODS, _EVENTS = 100.0, 400
+#: What is said of a fault that no simulation met.
+NOT_MET = (
+    ". None of {count} simulations came to such a state: if motion never does, this is no fault, and ranges "
+    "of the states say so (spread: {{{state}: [lowest, highest]}})"
+)
+
+
+def report_fault(report: ModelReport, probe: Probe, topic: Topic, message: str) -> None:
+    """Report what is wrong at a sampled state: an error if simulations meet such a fault, else a warning."""
+    ends = _ends(probe)
+    if not ends or any(ends):
+        report.error(topic, message)
+    else:
+        report.warn(topic, message + NOT_MET.format(count=len(ends), state=probe.model.states[-1]))
+
+
+def _ends(probe: Probe) -> list[bool]:
+    """Return of each simulation whether it came to where motion cannot go on; nothing if none could start."""
+    from contfric.orbit.simulation import SimulationEnd, simulate
+
+    model, draw = probe.model, np.random.default_rng(probe.seed)
+    low, high = model.region(probe.vector)
+    found: list[bool] = []
+    for k in range(_STARTS):
+        state = None if k == 0 else draw.uniform(low, high)
+        try:
+            motion = simulate(
+                model, dict(probe.params), state=state, periods=_PERIODS, events=_EVENTS
+            )
+        except ContfricError:  # beyond a wall, or in no domain
+            continue
+        found.append(motion.end is SimulationEnd.IMPOSSIBLE)
+    return found
