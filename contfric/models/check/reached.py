@@ -6,11 +6,16 @@ simulation meets a fault; else it is a warning, with the region that was looked 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from contfric.errors import ContfricError
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
+
+if TYPE_CHECKING:
+    from contfric.orbit.simulation import Trajectory
 
 #: Simulations: one from the start by default, and from states that are drawn in the region.
 _STARTS = 12
@@ -47,5 +52,13 @@ def _ends(probe: Probe) -> list[bool]:
             )
         except ContfricError:  # beyond a wall, or in no domain
             continue
-        found.append(motion.end is SimulationEnd.IMPOSSIBLE)
+        found.append(motion.end is SimulationEnd.IMPOSSIBLE or _is_outside(probe, motion))
     return found
+
+
+def _is_outside(probe: Probe, motion: Trajectory) -> bool:
+    """Tell whether a simulation has left the region of its mode, where nothing follows."""
+    model, (_, t, y, mode) = probe.model, motion.last
+    domains = model.domains_of(model.whole_mode(mode)) if mode else ()
+    sides = {s: v for s, v in probe.signs(t, y).items() if v and s not in model.settled_sides}
+    return any({d.signs[s] for d in domains} == {-v} for s, v in sides.items())
