@@ -103,7 +103,9 @@ def test_ranges_have_units_and_names(tmp_path: Path) -> None:
     np.testing.assert_allclose([low[k], high[k], low[s], high[s]], [2, 40, -6, 6])
 
 
-@pytest.mark.parametrize(("entry", "says"), [("[0, 1, 2]", "a lowest and"), ("[1, 0]", "from 1 to 0")])
+@pytest.mark.parametrize(
+    ("entry", "says"), [("[0, 1, 2]", "a lowest and"), ("[1, 0]", "from 1 to 0")]
+)
 def test_ranges_that_are_none(tmp_path: Path, entry: str, says: str) -> None:
     with pytest.raises(ModelError, match=says):
         written(tmp_path, EPIDEMIC, f"{{I: {entry}}}")
