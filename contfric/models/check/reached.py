@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 _STARTS = 12
 #: Periods (units of time without an excitation) and events of each: transients are what is asked for.
 _PERIODS, _EVENTS = 100.0, 400
+#: Samples of each in which it may be out of its mode, and how far beyond a surface no rounding is.
+_SAMPLES, _BEYOND = 200, 1e-6
 #: What is said of a fault that no simulation met.
 NOT_MET = (
     ". None of {count} simulations came to such a state: if motion never does, this is no fault, and ranges "
@@ -57,8 +59,13 @@ def _ends(probe: Probe) -> list[bool]:
 
 
 def _is_outside(probe: Probe, motion: Trajectory) -> bool:
-    """Tell whether a simulation has left the region of its mode, where nothing follows."""
-    model, (_, t, y, mode) = probe.model, motion.last
-    domains = model.domains_of(model.whole_mode(mode)) if mode else ()
-    sides = {s: v for s, v in probe.signs(t, y).items() if v and s not in model.settled_sides}
-    return any({d.signs[s] for d in domains} == {-v} for s, v in sides.items())
+    """Tell whether a simulation leaves the region of its mode, where nothing follows."""
+    model, rows = probe.model, motion.columns(_SAMPLES)
+    states = np.column_stack([rows[name] for name in model.states])
+    for t, y, mode in zip(rows["t"].tolist(), states, rows["mode"], strict=True):
+        domains = model.domains_of(model.whole_mode(mode))
+        for surface in (s.name for s in model.surfaces if s.name not in model.settled_sides):
+            side = {d.signs[surface] for d in domains}
+            if side in ({1}, {-1}) and probe.height(surface, t, y) * side.pop() < -_BEYOND:
+                return True
+    return False

@@ -217,7 +217,7 @@ def check_resets(report: ModelReport, probe: Probe) -> None:
             share = f"{len(faults)} of {fine + len(faults)} states that were tried"
             report.note(Topic.RESETS, f"{faults[0]}; so it is for {share}, the others go on")
         elif faults:
-            report_fault(report, probe, Topic.RESETS, faults[0])
+            report.error(Topic.RESETS, faults[0])
 
 
 def arrivals(probe: Probe, reset: Reset) -> Iterator[tuple[Domain, float, FloatArray]]:
