@@ -90,9 +90,12 @@ def test_starts_and_checks_stay_within_ranges(tmp_path: Path, seed: int) -> None
 
 
 def test_faults_that_nothing_meets_are_warnings(tmp_path: Path) -> None:
-    report = cf.check_model(written(tmp_path, BURST, "{V: 80}"))
+    text = BURST.replace("(1 - h)/100", "(1 - h)/2")  # h > 0 long before the gate
+    report = cf.check_model(written(tmp_path, text, "{V: [-80, -75]}"))
     assert report.ok, str(report)
     assert any("simulations came to such a state" in f.message for f in report.findings)
+    report = cf.check_model(written(tmp_path, BURST, "{V: 80}"))  # starts with h < 0 do come there
+    assert any("from starts in the spread came" in f.message for f in report.findings)
 
 
 def test_ranges_have_units_and_names(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Whether motion comes to states at which a model is at fault: asked of a few simulations.
 
 States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
-simulation meets a fault; else it is a warning, with the region that was looked at.
+simulation meets such a fault, else a warning.
 """
 
 from __future__ import annotations
@@ -23,20 +23,27 @@ _STARTS = 12
 _PERIODS, _EVENTS = 100.0, 400
 #: Samples of each in which it may be out of its mode, and how far beyond a surface no rounding is.
 _SAMPLES, _BEYOND = 200, 1e-6
-#: What is said of a fault that no simulation met.
+#: What is said of a fault that no simulation meets, and of one that some do, where no ranges are given.
 NOT_MET = (
     ". None of {count} simulations came to such a state: if motion never does, this is no fault, and ranges "
     "of the states say so (spread: {{{state}: [lowest, highest]}})"
 )
+DRAWN = (
+    ". {met} of {count} simulations from starts in the spread came to such states. Where these mean nothing, "
+    "give ranges (spread: {{{state}: [lowest, highest]}})"
+)
 
 
 def report_fault(report: ModelReport, probe: Probe, topic: Topic, message: str) -> None:
-    """Report what is wrong at a sampled state: an error if simulations meet such a fault, else a warning."""
+    """Report what is wrong at a sampled state: an error if simulations meet such faults, else a warning."""
     ends = _ends(probe)
-    if not ends or any(ends):
-        report.error(topic, message)
+    said = {"met": sum(ends), "count": len(ends), "state": probe.model.states[-1]}
+    if ends and not any(ends):
+        report.warn(topic, message + NOT_MET.format(**said))
     else:
-        report.warn(topic, message + NOT_MET.format(count=len(ends), state=probe.model.states[-1]))
+        report.error(
+            topic, message + (DRAWN.format(**said) if ends and not probe.model.ranges else "")
+        )
 
 
 def _ends(probe: Probe) -> list[bool]:
