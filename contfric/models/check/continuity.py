@@ -67,6 +67,35 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
             return
 
 
+def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
+    """Warn of observables of surfaces that have a kink in time within a mode: rates locate crossings."""
+    names = list(dict.fromkeys(s.observable for s in probe.model.surfaces))
+    for mode in probe.model.modes if probe.period > 0.0 else ():
+        for name, line, low, high in _lines(probe, mode.name):
+            if name != "t":
+                continue
+            report.count(Topic.CONTINUITY)
+            found = jump_along(partial(_rates_on, probe, mode.name, names, line), low, high)
+            if found is not None:
+                report.warn(
+                    Topic.CONTINUITY,
+                    f"the rate of the observable '{names[found[0]]}' in mode '{mode.name}' jumps at "
+                    f"t = {found[1]:.9g}: crossings near such a kink are missed, or found where none is. "
+                    "Make the place a surface, with a mode on each side",
+                )
+                return
+
+
+def _rates_on(
+    probe: Probe, mode: str, names: list[str], line: Line, place: float
+) -> FloatArray | None:
+    """Return the rates of observables by time alone at a place of a line; None outside of the mode."""
+    t, y = line(place)
+    if not probe.is_in(mode, probe.signs(t, y)):
+        return None
+    return np.array([probe.flow.gradient(name, t, y)[0] for name in names])
+
+
 def _without_values(report: ModelReport, probe: Probe) -> bool:
     """Say in which mode a formula has no value at some states (a root of a negative level), if in any."""
     for mode in probe.model.modes:
@@ -226,7 +255,8 @@ def _change(a: FloatArray | None, b: FloatArray | None, size: FloatArray) -> flo
     """Return the largest relative change between two places; 0 where one is outside of the mode."""
     if a is None or b is None:
         return 0.0
-    change = np.max(np.abs(a - b) / size)
+    with np.errstate(invalid="ignore"):  # a pole
+        change = np.max(np.abs(a - b) / size)
     return float(change) if np.isfinite(change) else np.inf
 
 
