@@ -307,8 +307,8 @@ class Model(Shown, TransitionMaps):
         >>> import contfric as cf
         >>> model = cf.load_model("coulomb")
         >>> low, high = model.region(model.vector({}), 2.0)
-        >>> (low == -high).all()
-        np.True_
+        >>> bool((low == -high).all())
+        True
         """
         params = self.mapping(vector)
         half = wider * np.abs(self.spread(params))

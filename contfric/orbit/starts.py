@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -123,7 +125,7 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
     half_width: FloatArray = model.spread(model.mapping(vector))
     low, high = model.region(vector)
     rest = _at_a_tick(model, vector) + 0.5 * (low + high)
-    kept = [k for k in range(1, len(rest)) if rest[k] == 0.0 and _stays_zero(model, vector, k)]
+    kept = [k for k in _kept_zeros(model) if rest[k] == 0.0]
     rest[kept] = _WITHIN * half_width[kept]
     moved = half_width[0] if low[0] == -high[0] else _WITHIN * half_width[0]
     for place in _PLACES:
@@ -148,14 +150,21 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
     )
 
 
-def _stays_zero(model: Model, vector: FloatArray, k: int) -> bool:
-    """Tell whether a state that is 0 stays so for ever, in all modes and resets: no infectives, no mass."""
+@lru_cache(maxsize=64)
+def _kept_zeros(model: Model) -> tuple[int, ...]:
+    """Return the states (not the first) that stay 0 for ever if they are 0: infectives, a mass."""
     if model.composed or not model.definition:
-        return False
-    probe = Probe(model, model.mapping(vector))
-    rng, modes = np.random.default_rng(1), [m.name for m in model.modes]
+        return ()
+    probe = Probe(model, model.defaults)
+    return tuple(k for k in range(1, len(model.states)) if _stays_zero(probe, k))
+
+
+def _stays_zero(probe: Probe, k: int) -> bool:
+    """Tell whether a state that is 0 stays so for ever, in all modes and resets."""
+    model, rng = probe.model, np.random.default_rng(1)
+    modes = [m.name for m in model.modes]
     for _ in range(_DRAWN):
-        t, y = rng.uniform(), rng.uniform(*model.region(vector))
+        t, y = rng.uniform(), rng.uniform(*model.region(probe.vector))
         y[k] = 0.0
         if any(m not in model.chatter_by_mode and probe.field(m, t, y)[k] != 0.0 for m in modes):
             return False
