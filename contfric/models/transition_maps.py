@@ -11,7 +11,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.parts import across, led, nearest
+from contfric.models.overlapping import nearest
+from contfric.models.parts import across, led
 from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
