@@ -40,9 +40,10 @@ def default_states(model: Model, params: Mapping[str, float], count: int) -> Flo
     width: FloatArray = np.asarray(model.spread(params), dtype=np.float64)
     states = np.zeros((count, len(width)))
     states[0, 0] = width[0]  # as simulations start
-    if model.resets:
+    low, high = model.region(model.vector(params))
+    if model.resets or model.ranges is not None:
         states[0] = displaced(model, model.vector(params))
-    states[1:] = width * spread_points(count - 1, len(width))
+    states[1:] = 0.5 * (low + high) + width * spread_points(count - 1, len(width))
     return states
 
 

@@ -108,14 +108,16 @@ class Zeros:
         By turns damped and not (which is less sure, and reaches farther), near and far.
         """
         rng = np.random.default_rng(seed)
+        low, high = self.region.model.region(self.p)
+        middle = 0.5 * (low + high)
         draws = rng.uniform(-1.0, 1.0, (starts, len(self.scale))) * self.scale
         draws[0] = 0.0
         for k, draw in enumerate(draws):
-            start = _WIDTHS[k // 2 % len(_WIDTHS)] * draw
+            start = middle + _WIDTHS[k // 2 % len(_WIDTHS)] * draw
             found = self.newton(start, damped=k % 2 == 0)
             if found is None:
                 continue
-            near = np.all(np.abs(found) <= _FAR * self.scale)
+            near = np.all(np.abs(found - middle) <= _FAR * self.scale)
             if near or not self.region.domain_of(found, self.p)[1]:
                 y = np.where(np.abs(found) < _NOTHING * self.scale, 0.0, found)
                 if self._falls(start, y):

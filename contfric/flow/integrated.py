@@ -14,7 +14,8 @@ differentiated by; whatever has no space (an array of length 0) is not filled.
 4. ``period(p, which, grad)``: return the period of the excitation, or 0; ``grad`` (m,).
    The field and the observables must have this period.
 5. ``scale(i, p)`` (``scale_signature``): return the natural size of state i, the unit of its absolute
-   tolerance. A state that is multiplied by a stiffness of 1000 in the field has the scale 1/1000.
+   tolerance. A state that is multiplied by a stiffness of 1000 in the field has the scale 1/1000. Negative:
+   the size of a state that is known to a share of itself, with no absolute tolerance (its range begins at 0).
 6. ``level(k, p, which, grad)``: return the level of surface k.
 
 Then ``Functions(field=field, ...).flow(level)`` is the flow, a ``CompiledFlow``. ``tests/integrated`` has

@@ -58,7 +58,7 @@ FUNCTIONS = {
     "observe": observe_signature,
     "rate": rate_signature,
     "period": period_signature,
-    # scale(i, p): natural size of state i, the unit of its absolute tolerance
+    # scale(i, p): natural size of state i, the unit of its absolute tolerance; negative where it has none
     "scale": scale_signature,
     # onto(mode, t, y, p, which, y1, jac): the state on the surfaces that a mode slides on
     "onto": field_signature,

@@ -94,14 +94,20 @@ def slope(motion, mode, c, t, y, p, which, workspace, out):  # type: ignore[no-u
                     out[row + j] += factor * y[other + j]
 
 
+#: Scale of the tolerance of a state that is known to a share of itself (its range begins at 0): an error of
+#: the state's size would make a small number negative, and it would grow so. Not 0: it may begin there.
+NOTHING = 1e-100
+
+
 @helper
 def begin(motion, y0, p, which, workspace):  # type: ignore[no-untyped-def]
     """Write the start of the variations, and what error each component is allowed."""
     n, columns, allowed = y0.shape[0], workspace.partial.shape[1], workspace.allowed
     for i in range(n):
         workspace.start[i] = y0[i]
-        workspace.scales[i] = motion.scale(i, p)
-        allowed[i] = motion.absolute * workspace.scales[i]
+        scale = motion.scale(i, p)
+        workspace.scales[i] = abs(scale)
+        allowed[i] = motion.absolute * (scale if scale > 0.0 else NOTHING)
     for i in range(n if columns > 0 else 0):
         for j in range(columns):
             k = n + i * columns + j
@@ -111,7 +117,7 @@ def begin(motion, y0, p, which, workspace):  # type: ignore[no-untyped-def]
             elif j > n:
                 unit = max(1.0, abs(p[which[j - n - 1]]))
             workspace.start[k] = 1.0 if j == 1 + i else 0.0
-            allowed[k] = motion.absolute * workspace.scales[i] / unit
+            allowed[k] = allowed[i] / unit
 
 
 #: Deepest bisection of a step in the search of roots: down to the resolution of time.

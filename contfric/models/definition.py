@@ -88,6 +88,9 @@ class Model(Shown, TransitionMaps):
     spread : callable
         ``spread(params)`` returns the half-width of the region that starts are drawn from,
         shape (n,), nondimensional.
+    ranges : callable or None
+        ``ranges(params)`` returns the lowest and highest value of each state, shape (n, 2), no numbers for
+        a state that has no range; None where none has.
     resets : tuple of Reset
         Surfaces at which the state is mapped.
     chatters : tuple of Chatter
@@ -148,6 +151,7 @@ class Model(Shown, TransitionMaps):
     stop_surface: str
     flow_factory: Callable[[], CompiledFlow] = field(repr=False)
     spread: Callable[[Mapping[str, float]], FloatArray] = field(repr=False)
+    ranges: Callable[[Mapping[str, float]], FloatArray] | None = field(default=None, repr=False)
     references: tuple[str, ...] = ()
     resets: tuple[Reset, ...] = ()
     chatters: tuple[Chatter, ...] = ()
@@ -290,6 +294,28 @@ class Model(Shown, TransitionMaps):
                     + (constraint.meaning or "Choose a value that obeys it.")
                 )
         return values
+
+    def region(self, vector: FloatArray, wider: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and highest states where motion is looked for: within ranges, else about 0.
+
+        Parameters
+        ----------
+        wider : half-widths to go to, of states that have no range
+
+        Examples
+        --------
+        >>> import contfric as cf
+        >>> model = cf.load_model("coulomb")
+        >>> low, high = model.region(model.vector({}), 2.0)
+        >>> bool((low == -high).all())
+        True
+        """
+        params = self.mapping(vector)
+        half = wider * np.abs(self.spread(params))
+        if self.ranges is None:
+            return -half, half
+        low, high = self.ranges(params).T
+        return np.where(np.isfinite(low), low, -half), np.where(np.isfinite(high), high, half)
 
     def vector(self, params: Mapping[str, Any]) -> FloatArray:
         """Return the checked parameters as the engine's vector, shape (parameters,)."""

@@ -26,7 +26,7 @@ from contfric.models.definition import (
     Symmetry,
 )
 from contfric.models.departing import departing_side, leaves_at_rest, turned_modes
-from contfric.models.description import Description
+from contfric.models.description import Description, Range
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
@@ -45,15 +45,22 @@ _POINTS = 8
 
 @dataclass(frozen=True)
 class Spread:
-    """Half-widths of starts, from the expressions of a description."""
+    """Half-widths of starts, and ranges of states, from the expressions of a description."""
 
     texts: tuple[str, ...]
     definition: str
+    ends: tuple[Range, ...] = ()
 
     def __call__(self, params: Mapping[str, float]) -> FloatArray:
         """Return the half-width of each state, shape (n,)."""
         evaluator = _evaluator(self.definition)
         return np.array([evaluator.value(text, params) for text in self.texts])
+
+    def ranges(self, params: Mapping[str, float]) -> FloatArray:
+        """Return the lowest and highest value of each state, shape (n, 2); no number without a range."""
+        evaluator, nothing = _evaluator(self.definition), [math.nan, math.nan]
+        rows = [[evaluator.value(text, params) for text in ends] or nothing for ends in self.ends]
+        return np.array(rows)
 
 
 @lru_cache(maxsize=64)
@@ -133,7 +140,8 @@ def as_described(
         if extrema_at_joints(sampler, surfaces)
         else displacement_of(description),
         "flow_factory": GeneratedFlow(description.motion),
-        "spread": Spread(description.spread, description.text),
+        "spread": (spread := Spread(description.spread, description.text, description.ranges)),
+        "ranges": spread.ranges if description.ranges else None,
         "references": description.references,
         "autonomous": not description.period,
         "max_step": description.max_step,

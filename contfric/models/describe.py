@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from contfric.base.yaml_lines import comma_hint
 from contfric.errors import ModelError
 from contfric.models.clocks import TICK
 from contfric.models.contact_laws import KEY as LAWS
@@ -20,6 +19,7 @@ from contfric.models.measuring import measured
 from contfric.models.names import Names
 from contfric.models.parts import Chatter
 from contfric.models.quantity_entries import check_quantities, read_quantities
+from contfric.models.ranges import check_ranges, ranges_of, spread_of
 from contfric.models.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.shorthand import expanded
 from contfric.models.units import APPLIED, KEY, read_units
@@ -115,7 +115,8 @@ def _described(data: dict[str, Any]) -> Description:
         stop_surface=_stop_surface(top, surfaces),
         kinks=top.texts("kinks"),
         angles=top.texts("angles"),
-        spread=_spread(top, states),
+        spread=spread_of(top, states),
+        ranges=ranges_of(top, states),
         method=method,
         tolerance=tolerance,
         max_step=_max_step(top),
@@ -176,19 +177,11 @@ def _period(top: Part) -> str:
             "a model has one of 'period: 2*pi/Omega' (that of its excitation) and "
             "'autonomous: true', got " + ("both" if given else "none"),
         )
-    return _expression(top, "period") if given else ""
-
-
-def _expression(part: Part, key: str) -> str:
-    value = part.data[key]
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        hint = comma_hint(key, value)
-        part.fail(key, f"'{key}' must be an expression, got {value!r}{hint}")
-    return " ".join(str(value).split())
+    return top.expression("period") if given else ""
 
 
 def _expressions(part: Part) -> dict[str, str]:
-    return {name: _expression(part, name) for name in part.data}
+    return {name: part.expression(name) for name in part.data}
 
 
 def _surfaces(
@@ -204,7 +197,7 @@ def _surfaces(
         valid = (*formulas, *(s for s in states if s not in formulas))
         observable = entry.one_of("observable", valid, "observable or state")
         formulas.setdefault(observable, observable)
-        level = _expression(entry, "level") if "level" in entry.data else "0"
+        level = entry.expression("level") if "level" in entry.data else "0"
         surfaces.append(Surface(name, observable, level, bool(entry.flag("switching"))))
     if not surfaces and "period" not in top.data:
         top.fail("surfaces", "a model without excitation has at least one surface: it fixes orbits")
@@ -250,7 +243,7 @@ def _rates(part: Part, states: tuple[str, ...], mode: str | None, entry: Part) -
     for state in states:
         if state not in part.data:
             part.fail(None, f"the rate of '{state}' is missing: write {state}: expression")
-    return tuple(_expression(part, state) for state in states)
+    return tuple(part.expression(state) for state in states)
 
 
 def _domains(
@@ -331,13 +324,6 @@ def _stop_surface(top: Part, surfaces: tuple[Surface, ...]) -> str:
     return top.one_of("stop_surface", valid, "surface or kink" if top.texts("kinks") else "surface")
 
 
-def _spread(top: Part, states: tuple[str, ...]) -> tuple[str, ...]:
-    part = top.part("spread", "a mapping of states to half-widths")
-    part.only(states)
-    given = _expressions(part)
-    return tuple(given.get(state, "1") for state in states)
-
-
 def _integration(top: Part) -> tuple[str, float]:
     part = top.part("integration", "{method: explicit, tolerance: 1.0e-12}")
     part.only(("method", "tolerance"))
@@ -384,6 +370,7 @@ def _check_expressions(found: Description, names: Names) -> None:
             names.check(("resets", surface, state), value, timed)
     for state, width in zip(found.states, found.spread, strict=True):
         names.check(("spread", state), width, only_parameters=True)
+    check_ranges(found, names)
     if found.period:
         names.check(("period",), found.period, only_parameters=True)
         check_period(found)

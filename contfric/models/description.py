@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 from contfric.models.contact_laws import KEY as LAWS
 from contfric.models.contact_laws import ContactLaws, written
@@ -21,6 +21,9 @@ from contfric.models.parts import Chatter, Lead
 
 #: The key of the structure that modes are made from.
 STRUCTURE = "structure"
+
+#: Expressions of the lowest and the highest value of a state; nothing where it has no range.
+Range: TypeAlias = tuple[str, str] | tuple[()]
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class Description:
     kinks : observables at whose zeros the fields have kinks, and are continuous
     angles : states that are the same a turn later
     spread : expression of the half-width of starts, one a state
+    ranges : expressions of the lowest and highest value of each state that has a range, () of others
     method, tolerance : how motion is integrated (:mod:`contfric.flow.integrated`)
     max_step : largest step of a continuation where the user gives none; None for the engine's
     quantities : (name, expression) of each quantity that the file declares
@@ -93,6 +97,7 @@ class Description:
     kinks: tuple[str, ...] = ()
     angles: tuple[str, ...] = ()
     spread: tuple[str, ...] = ()
+    ranges: tuple[Range, ...] = ()
     method: str = "explicit"
     tolerance: float = 1e-12
     max_step: float | None = None
@@ -128,7 +133,7 @@ class Description:
                 {"where": dict(d.where), "leaves": dict(d.leaves)} for d in self.departures
             ],
             "resets": {name: self._reset(name, texts) for name, texts in self.resets.items()},
-            "spread": dict(zip(self.states, self.spread, strict=True)),
+            "spread": self._spread(),
             "integration": {"method": self.method, "tolerance": self.tolerance},
         }
         found.update({"period": self.period} if self.period else {"autonomous": True})
@@ -153,6 +158,11 @@ class Description:
             STRUCTURE: dict(self.structure),
         }
         return {**found, **{key: value for key, value in optional.items() if value}}
+
+    def _spread(self) -> dict[str, Any]:
+        widths: dict[str, Any] = dict(zip(self.states, self.spread, strict=True))
+        ranges = zip(self.states, self.ranges, strict=False)
+        return {**widths, **{state: list(ends) for state, ends in ranges if ends}}
 
     def _reset(self, name: str, texts: Mapping[str, str]) -> dict[str, Any]:
         found: dict[str, Any] = dict(texts)

@@ -108,6 +108,14 @@ class Part:
             self.fail(key if key in self.data else None, f"'{key}': no {what} '{value}'{hint}")
         return str(value)
 
+    def expression(self, key: str) -> str:
+        """Return an entry that is an expression."""
+        value = self.data[key]
+        if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+            hint = comma_hint(key, value)
+            self.fail(key, f"'{key}' must be an expression, got {value!r}{hint}")
+        return " ".join(str(value).split())
+
     def flag(self, key: str) -> bool | None:
         """Return an entry that is true or false, None if it is not there."""
         value = as_truth(self.data.get(key))

@@ -160,18 +160,23 @@ class Sampler:
     seed: int = 1
 
     @cached_property
-    def widths(self) -> list[float]:
-        """Half-widths of the region: twice those that starts are drawn from."""
-        spread = self.evaluator.description.spread
-        found = [abs(self.evaluator.value(text, self.params)) for text in spread]
-        return [2.0 * w if 0.0 < w < math.inf else 2.0 for w in found]
+    def region(self) -> list[tuple[float, float]]:
+        """Lowest and highest value of each state: its range, else twice what starts are drawn from."""
+        value, description = self.evaluator.value, self.evaluator.description
+        found = [abs(value(text, self.params)) for text in description.spread]
+        wide = [2.0 * w if 0.0 < w < math.inf else 2.0 for w in found]
+        ranges = description.ranges or ((),) * len(wide)
+        return [
+            (value(ends[0], self.params), value(ends[1], self.params)) if ends else (-w, w)
+            for w, ends in zip(wide, ranges, strict=True)
+        ]
 
     def states(self, count: int) -> Iterator[tuple[float, list[float]]]:
         """Yield times and states."""
         draw = random.Random(self.seed)
         span = self.evaluator.period(self.params) or 10.0
         for _ in range(count):
-            yield draw.uniform(0.0, span), [draw.uniform(-w, w) for w in self.widths]
+            yield draw.uniform(0.0, span), [draw.uniform(*ends) for ends in self.region]
 
     def on(
         self, surface: str, sides: Mapping[str, int], most: int

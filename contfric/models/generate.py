@@ -89,7 +89,7 @@ def module_source(description: Description, digest: str) -> str:
     writer.of_parameters("period(p, which, grad)", None, [formulas.period()])
     writer.vectors("reset", "k", "y1", [resets[names.index(n)] for n in order])
     writer.vectors("onto", "mode", "y1", formulas.projections())
-    writer.scales(formulas.scales())
+    writer.scales(formulas.scales(), formulas.positive())
     timed = [
         c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
     ]
@@ -205,13 +205,15 @@ class _Writer:
         ]
         self._blocks(head, index, blocks, "grad", ["grad[j] = 0.0"], "value")
 
-    def scales(self, values: list[Any]) -> None:
-        """Write the sizes of states, the units of their tolerances: at most 1."""
+    def scales(self, values: list[Any], positive: list[int]) -> None:
+        """Write the sizes of states, the units of their tolerances: at most 1; negative of positive ones."""
         blocks = [[Output(VALUES, "value", e)] for e in values]
         self._blocks("size_of(i, p)", "i", blocks, "", [], "value")
         self.code.add("", "@kernel(scale_signature)")
         self.code.open("def scale_of(i, p):")
-        self.code.add("size = abs(size_of(i, p))", "return size if 0.0 < size < 1.0 else 1.0")
+        self.code.add("size = abs(size_of(i, p))", "size = size if 0.0 < size < 1.0 else 1.0")
+        known = " or ".join(f"i == {k}" for k in positive)
+        self.code.add(f"return -size if {known} else size" if known else "return size")
         self.code.close()
 
     def _define(self, head: str, blocks: list[list[Output]]) -> None:

@@ -107,9 +107,10 @@ class Landing:
             behind = self._behind(before, met, t, y)
             turn = before.signs[surface] if own else 1
             verdicts[turn * self._side(behind, surface, met, t, y)] += 1
-            wanted = [d for d in behind if d.own_mode in named and d.own_mode != before.own_mode]
+            others = named if own else named - {before.own_mode}
+            wanted = [d for d in behind if d.own_mode in others]
             asked[turn * self._side(wanted, surface, met, t, y)] += 1
-            passed = passed and len({d.mode for d in behind}) == 1
+            passed = passed and self._is_label(surface, behind)
         told = {side for side in verdicts if side}
         if len(told) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
             told = asked.keys() - {0}
@@ -134,6 +135,12 @@ class Landing:
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
             "mode to which it leads ('to: mode', which lies on one side of that surface)",
         )
+
+    def _is_label(self, surface: str, behind: Sequence[Domain]) -> bool:
+        """Tell whether one mode is behind, on both sides of a surface: motion passes it there unchanged."""
+        modes = {d.mode for d in behind}
+        sides = {d.signs[surface] for d in self.domains if d.mode in modes}
+        return len(modes) == 1 and sides >= {1, -1}
 
     def _behind(
         self, before: Domain, met: Sequence[str], t: float, y: Sequence[float]

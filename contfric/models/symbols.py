@@ -155,6 +155,15 @@ class Formulas:
             for state, text in zip(self.description.states, self.description.spread, strict=True)
         ]
 
+    def positive(self) -> list[int]:
+        """Return the states that are never negative: their range begins at 0."""
+        states, ranges = self.description.states, self.description.ranges
+        lowest = [
+            self.read(("spread", state), ends[0]) if ends else None
+            for state, ends in zip(states, ranges or ((),) * len(states), strict=True)
+        ]
+        return [k for k, low in enumerate(lowest) if low is not None and low == 0]
+
     def resets(self) -> list[list[Any]]:
         """Return the map of the state at each surface."""
         found = []

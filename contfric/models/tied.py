@@ -162,8 +162,12 @@ def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any
     found = dict(data)
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
     found["constraints"] = {put.condition(text): why for text, why in data["constraints"].items()}
-    for key in ("define", "observables", "spread"):
+    for key in ("define", "observables"):
         found[key] = put.each(data[key])
+    found["spread"] = {
+        state: [put.text(end) for end in width] if isinstance(width, list) else put.text(width)
+        for state, width in data["spread"].items()
+    }
     if "quantities" in data:
         found["quantities"] = put.each(data["quantities"])
     if "forces" in data:

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
+from contfric.models.overlapping import nearest
 from contfric.models.parts import across, led
 from contfric.models.section_maps import SectionMaps
 
@@ -164,7 +165,9 @@ class TransitionMaps(SectionMaps):
                 ]
                 for target in found:
                     key = tuple(target.signs[s.name] for s in self.surfaces)
-                    fits = {d.mode for d in self._domains_by_signs[key]}
+                    beside = self._domains_by_signs[key]
+                    fits = {d.mode for d in nearest(beside, domain.own_mode, self._side_of)}
+                    fits |= {d.mode for d in beside if d.mode == domain.mode}
                     named = {d.own_mode for d in found if d.signs == target.signs}
                     mapped = self.maps_at(domain, surface.name)
                     several = len(named) > 1 if mapped else len(fits) > 1
@@ -354,7 +357,7 @@ class TransitionMaps(SectionMaps):
         same = [d.name for d in fits if d.own_mode == mode] or [
             d.name for d in fits if d.mode == whole
         ]
-        return same[0] if same else fits[0].name if fits else None
+        return same[0] if same else nearest(fits, mode, self._side_of)[0].name if fits else None
 
     @cached_property
     def _domains_by_signs(self) -> dict[tuple[int, ...], tuple[Domain, ...]]:

@@ -272,10 +272,13 @@ def _of_pair(tangencies: _Tangencies, starts: int, seed: int, dimension: int) ->
     period = model.view(vector).period if not model.autonomous else 0.0
     widths = np.abs(model.spread(model.mapping(vector)))
     sizes = np.array([period or 1.0, *np.where(widths > 0.0, widths, 1.0)])
+    low, high = model.region(vector)
+    ranged = low != -high
     rng = np.random.default_rng(seed)
     found: list[tuple[FloatArray, TwoFold]] = []
     for _ in range(starts):
         start = rng.uniform(-2.0, 2.0, len(sizes)) * sizes
+        start[1:][ranged] = rng.uniform(low[ranged], high[ranged])
         start[0] = rng.uniform(0.0, period) if period else 0.0
         z = tangencies.newton(start, sizes)
         if z is None or not tangencies.is_regular(z, sizes):

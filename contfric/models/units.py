@@ -122,7 +122,12 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
             for name, reset in data["resets"].items()
         }
     if data.get("spread"):
-        found["spread"] = {s: over(w, states.get(s, 1.0)) for s, w in data["spread"].items()}
+        found["spread"] = {
+            s: [over(end, states.get(s, 1.0)) for end in w]
+            if isinstance(w, (list, tuple))
+            else over(w, states.get(s, 1.0))
+            for s, w in data["spread"].items()
+        }
     if data.get("period") is not None:
         found["period"] = over(data["period"], time)
     if isinstance(data.get("symmetry"), (str, Mapping)):

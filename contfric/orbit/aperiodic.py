@@ -82,8 +82,21 @@ def _unbounded(trajectory: Trajectory) -> str:
     size = float(np.max(np.abs(trajectory.states[-1])))
     return (
         f"no periodic orbit: the solution at {where} grows without bound (to {size:.3g} so far), as at "
-        "a resonance with too little damping. Choose other parameters"
+        f"a resonance with too little damping{out_of_range(trajectory)}. Choose other parameters"
     )
+
+
+def out_of_range(trajectory: Trajectory) -> str:
+    """Return which state first leaves the range that the model gives it, at an event; or nothing."""
+    model = trajectory.model
+    if model.ranges is None:
+        return ""
+    bounds = model.ranges(trajectory.params)
+    for k, y in enumerate(trajectory.states):
+        for state, value, (low, high) in zip(model.states, y.tolist(), bounds, strict=True):
+            if value < low or value > high:  # no numbers where it has no range
+                return f"; event {k + 1} is the first with {state} = {value:.6g} out of [{low:g}, {high:g}]"
+    return ""
 
 
 #: Times after which a solution that goes round is somewhere else: no multiples of each other's periods.

@@ -11,7 +11,14 @@ from contfric.errors import ConvergenceError, function_of, real_number, whole_nu
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.aperiodic import MOST, MOST_PERIODS, affordable, goes_on, why_none
+from contfric.orbit.aperiodic import (
+    MOST,
+    MOST_PERIODS,
+    affordable,
+    goes_on,
+    out_of_range,
+    why_none,
+)
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.repetition import shortest
@@ -220,6 +227,7 @@ def _check_motion(trajectory: Trajectory) -> None:
                 trajectory,
             )
         says = "; `contfric check` says where no mode follows" if missing else ""
+        why += out_of_range(trajectory)
         raise ConvergenceError(
             f"no periodic orbit: {why}. Choose other parameters or another start{says}",
             trajectory,

@@ -174,7 +174,8 @@ def _matching_stretches(
     """Yield (mismatch, joints) of simulated stretches that walk the itinerary of one turn."""
     model = system.model
     rng = np.random.default_rng(seed)
-    spread = model.spread(model.mapping(vector))
+    low, high = model.region(vector)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
     period = model.view(vector).period or 10.0
     turn = system.layout.turn
     length, events = 2.0 + 2.0 * turn, 40 * (1 + int(turn))
@@ -183,7 +184,7 @@ def _matching_stretches(
     starts = STARTS // 4
     for k in range(starts):
         say(f"simulating from start {k + 1} of {starts}")
-        y = rng.uniform(-1.0, 1.0, spread.shape) * spread
+        y = middle + rng.uniform(-1.0, 1.0, half.shape) * half
         if rng.random() < 0.5:
             y[1:] = 0.0  # at rest: the start of a stick or of a slide
         time = rng.uniform(0.0, period)

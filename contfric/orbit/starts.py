@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.check.probe import Probe
 from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
@@ -15,6 +18,10 @@ from contfric.orbit.tables import bits_of
 #: Displacements that a start is looked for at, in half-widths of the model: where the first is in no
 #: domain (after a wall, or on a surface that motion does not leave), the next.
 _PLACES = (1.0, -1.0, 0.5, -0.5, 0.25, -0.25, 0.0)
+#: Half-widths of a range that the first state is displaced by at most: at its ends motion may stay.
+_WITHIN = 0.5
+#: Random states at which a rate that is 0 is so everywhere, but for a set of measure 0.
+_DRAWN = 3
 #: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
 #: nobody may have written, and then further out.
 _DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
@@ -118,17 +125,23 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         If no state that was tried is in a domain.
     """
     half_width: FloatArray = model.spread(model.mapping(vector))
-    rest = _at_a_tick(model, vector)
+    low, high = model.region(vector)
+    rest = _at_a_tick(model, vector) + 0.5 * (low + high)
+    kept = [k for k in _kept_zeros(model) if rest[k] == 0.0]
+    rest[kept] = _WITHIN * half_width[kept]
+    moved = half_width[0] if low[0] == -high[0] else _WITHIN * half_width[0]
     for place in _PLACES:
         y = rest.copy()
-        y[0] = place * half_width[0]
+        y[0] += place * moved
         if _is_start(model, y, vector):
             return y
     rng = np.random.default_rng(1)  # always the same start
-    clocks = rest != 0.0
+    clocks = np.array([is_clock(state) for state in model.states])
     for wider in _WIDER:
         for _ in range(_DRAWS // len(_WIDER)):
-            y = np.where(clocks, rest, rng.uniform(-wider, wider, half_width.shape) * half_width)
+            low, high = model.region(vector, wider)
+            y = 0.5 * (low + high) + rng.uniform(-0.5, 0.5, half_width.shape) * (high - low)
+            y = np.where(clocks, rest, y)
             if _is_start(model, y, vector):
                 return y
     within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
@@ -137,6 +150,29 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
         f"up to {_WIDER[-1]:g} times as far, none is in a domain. "
         "Give one (state=...), or correct 'spread' or the sides of the modes"
     )
+
+
+@lru_cache(maxsize=64)
+def _kept_zeros(model: Model) -> tuple[int, ...]:
+    """Return the states (not the first) that stay 0 for ever if they are 0: infectives, a mass."""
+    if model.composed or not model.definition:
+        return ()
+    probe = Probe(model, model.defaults)
+    return tuple(k for k in range(1, len(model.states)) if _stays_zero(probe, k))
+
+
+def _stays_zero(probe: Probe, k: int) -> bool:
+    """Tell whether a state that is 0 stays so for ever, in all modes and resets."""
+    model, rng = probe.model, np.random.default_rng(1)
+    modes = [m.name for m in model.modes]
+    for _ in range(_DRAWN):
+        t, y = rng.uniform(), rng.uniform(*model.region(probe.vector))
+        y[k] = 0.0
+        if any(m not in model.chatter_by_mode and probe.field(m, t, y)[k] != 0.0 for m in modes):
+            return False
+        if any(probe.reset(reset.surface, t, y)[k] != 0.0 for reset in model.resets):
+            return False
+    return True
 
 
 def _at_a_tick(model: Model, vector: FloatArray) -> FloatArray:

@@ -37,7 +37,8 @@ def time_scale(model: Model) -> float:
     view = model.view(model.vector({}))
     widths = model.spread(model.defaults)
     rng, times = np.random.default_rng(1), []
-    states = rng.uniform(-1.0, 1.0, (_STATES, len(widths))) * widths
+    low, high = model.region(model.vector({}))
+    states = 0.5 * (low + high) + rng.uniform(-1.0, 1.0, (_STATES, len(widths))) * widths
     for name in {surface.observable for surface in model.surfaces}:
         fastest = 0.0
         for y in states:

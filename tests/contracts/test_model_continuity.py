@@ -135,3 +135,30 @@ def test_formulas_that_cannot_jump_are_told_from_those_that_may() -> None:
     for one, other in product(parts, [*jumps, formulas.Power(x, p), sympy.tan(x), sympy.floor(x)]):
         assert not formulas.cannot_jump(one + 2 * other, {x})
         assert formulas.cannot_jump(other.subs(x, p + 7), {x})
+
+
+@pytest.mark.parametrize(
+    ("wave", "kinked"),
+    [
+        ("asin(sin(3*w*t + 0.2))", True),
+        ("abs(sin(w*t))", True),
+        ("max(cos(2*w*t), 0.3)", True),
+        ("sin(w*t)**3", False),
+        ("tanh(20*sin(w*t))", False),
+    ],
+)
+def test_kinks_in_time_of_a_switch_are_said(tmp_path, wave: str, kinked: bool) -> None:
+    """A carrier that is a triangle: crossings were found at its peaks, and the simulation ended there."""
+    text = MODEL.format(name="model", force="cos(w*t)").replace(
+        "x: x}", f'x: x, u: "{wave} - 0.1*x"}}'
+    )
+    path = tmp_path / "model.yaml"
+    path.write_text(
+        text.replace("surfaces:\n", "surfaces:\n  sw: {observable: u}\n"), encoding="utf-8"
+    )
+    said = [
+        f.message
+        for f in cf.check_model(path).findings
+        if "crossings near such a kink" in f.message
+    ]
+    assert bool(said) == kinked

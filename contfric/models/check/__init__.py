@@ -41,7 +41,11 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     >>> check_model("belt").ok
     True
     """
-    from contfric.models.check.continuity import check_continuity, check_reset_jumps
+    from contfric.models.check.continuity import (
+        check_continuity,
+        check_kinks_in_time,
+        check_reset_jumps,
+    )
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.filippov import check_filippov
     from contfric.models.check.hidden import check_hidden
@@ -79,6 +83,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_reached(report, probe)
     check_resets(report, probe)
     check_continuity(report, probe)
+    check_kinks_in_time(report, probe)
     check_reset_jumps(report, probe)
     check_kinks(report, loaded)
     check_reset_kinks(report, probe)

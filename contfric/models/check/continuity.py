@@ -68,6 +68,35 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
             return
 
 
+def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
+    """Warn of observables of surfaces that have a kink in time within a mode: rates locate crossings."""
+    names = list(dict.fromkeys(s.observable for s in probe.model.surfaces))
+    for mode in probe.model.modes if probe.period > 0.0 else ():
+        for name, line, low, high in _lines(probe, mode.name):
+            if name != "t":
+                continue
+            report.count(Topic.CONTINUITY)
+            found = jump_along(partial(_rates_on, probe, mode.name, names, line), low, high)
+            if found is not None:
+                report.warn(
+                    Topic.CONTINUITY,
+                    f"the rate of the observable '{names[found[0]]}' in mode '{mode.name}' jumps at "
+                    f"t = {found[1]:.9g}: crossings near such a kink are missed, or found where none is. "
+                    "Make the place a surface, with a mode on each side",
+                )
+                return
+
+
+def _rates_on(
+    probe: Probe, mode: str, names: list[str], line: Line, place: float
+) -> FloatArray | None:
+    """Return the rates of observables by time alone at a place of a line; None outside of the mode."""
+    t, y = line(place)
+    if not probe.is_in(mode, probe.signs(t, y)):
+        return None
+    return np.array([probe.flow.gradient(name, t, y)[0] for name in names])
+
+
 def _without_values(report: ModelReport, probe: Probe) -> bool:
     """Say in which mode a formula has no value at some states (a root of a negative level), if in any."""
     for mode in probe.model.modes:
@@ -93,7 +122,7 @@ def _without_values(report: ModelReport, probe: Probe) -> bool:
 
 def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
     """Yield (what changes, line, first place, last place) through a few states of a mode."""
-    widths = 2.0 * np.abs(probe.model.spread(probe.model.mapping(probe.vector)))
+    low, high = probe.model.region(probe.vector, 2.0)
     seen = 0
     for t, y in probe.states(_TRIED):
         place = probe.inside(mode, t, y)
@@ -104,7 +133,7 @@ def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
         if probe.period > 0.0:
             yield "t", partial(_at_time, state), time, time + probe.period
         for k, name in enumerate(probe.model.states):
-            yield name, partial(_at_state, time, state, k), -widths[k], widths[k]
+            yield name, partial(_at_state, time, state, k), low[k], high[k]
         if seen == probe.share(_STATES):
             return
 
@@ -245,7 +274,8 @@ def _change(a: FloatArray | None, b: FloatArray | None, size: FloatArray) -> flo
     """Return the largest relative change between two places; 0 where one is outside of the mode."""
     if a is None or b is None:
         return 0.0
-    change = np.max(np.abs(a - b) / size)
+    with np.errstate(invalid="ignore"):  # a pole
+        change = np.max(np.abs(a - b) / size)
     return float(change) if np.isfinite(change) else np.inf
 
 

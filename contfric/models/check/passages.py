@@ -1,10 +1,10 @@
-"""Modes that end where nothing is behind them: at resets of other modes, and at limits that cross."""
+"""Modes that end where nothing is behind them, at resets of others or at limits that cross, or never end."""
 
 from __future__ import annotations
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, Model, Reset
+from contfric.models.definition import Domain, Mode, Model, Reset
 
 #: States on each surface.
 _ON_SURFACE = 200
@@ -56,3 +56,14 @@ def crossed_limits(signs: dict[str, int]) -> str:
     """Return the contact whose moving limits are crossed: above the upper one, and below the lower."""
     pairs = ((s[:-1], sign) for s, sign in signs.items() if s.endswith("+"))
     return next((name for name, sign in pairs if sign > 0 and signs.get(f"{name}-", 0) < 0), "")
+
+
+def check_left(report: ModelReport, model: Model, mode: Mode) -> None:
+    """Warn of a sliding mode that nothing ends: motion would stay in it for ever."""
+    own = {d.name for d in model.domains if d.own_mode == mode.name}
+    if all(source not in own or own.issuperset(to) for (source, _), to in model.targets.items()):
+        report.warn(
+            Topic.SLIDING,
+            f"mode '{mode.name}' is never left: no surface ends it. Add the limits between which it can "
+            "stay to its 'in', such as F+: -, F-: +",
+        )

@@ -101,10 +101,10 @@ class Probe:
     def states(self, count: int) -> Iterator[tuple[float, FloatArray]]:
         """Yield times in one period and states in twice the region that starts are drawn from."""
         draw = random.Random(self.seed)
-        widths = 2.0 * np.abs(self.model.spread(self.model.mapping(self.vector)))
+        region = np.column_stack(self.model.region(self.vector, 2.0)).tolist()
         for _ in range(count):
             t = draw.uniform(0.0, self.period or 10.0)
-            yield t, np.array([draw.uniform(-w, w) for w in widths])
+            yield t, np.array([draw.uniform(*ends) for ends in region])
 
     def on(self, surface: str, count: int) -> Iterator[tuple[float, FloatArray]]:
         """Yield times and states on a surface."""

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
-from contfric.models.check.passages import crossed_limits, other_side
+from contfric.models.check.passages import check_left, crossed_limits, other_side
 from contfric.models.check.probe import Probe
+from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, FloatArray, Mode, Model, Reset, Surface
+from contfric.models.definition import Domain, FloatArray, Model, Reset, Surface
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400
@@ -156,7 +157,9 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                 )
                 return
             if following is None:
-                report.error(
+                report_fault(
+                    report,
+                    probe,
                     Topic.TRANSITIONS,
                     f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)}, and no "
                     f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (motion "
@@ -187,7 +190,9 @@ def _goes_on(
     rate = probe.rate(domain.own_mode, surface.name, t, y)
     if side * rate >= -_STILL:
         return True
-    report.error(
+    report_fault(
+        report,
+        probe,
         Topic.TRANSITIONS,
         f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)} and should go on in "
         f"'{following}', whose field leads back to the surface: motion is caught there. Add a mode "
@@ -260,7 +265,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
         if not mode.sliding or mode.name in model.chatter_by_mode:  # that is derived
             continue
         if not model.composed:  # else limits of the load end every stick
-            _check_left(report, model, mode)
+            check_left(report, model, mode)
         domain = next(d for d in model.domains if d.own_mode == mode.name)
         surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
         for t, y in probe.states(_ON_SURFACE):
@@ -278,17 +283,6 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
                         f"'{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
                     )
                     return
-
-
-def _check_left(report: ModelReport, model: Model, mode: Mode) -> None:
-    """Warn of a sliding mode that nothing ends: motion would stay in it for ever."""
-    own = {d.name for d in model.domains if d.own_mode == mode.name}
-    if all(source not in own or own.issuperset(to) for (source, _), to in model.targets.items()):
-        report.warn(
-            Topic.SLIDING,
-            f"mode '{mode.name}' is never left: no surface ends it. Add the limits between which it can "
-            "stay to its 'in', such as F+: -, F-: +",
-        )
 
 
 def check_symmetry(report: ModelReport, probe: Probe) -> None:

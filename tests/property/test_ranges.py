@@ -1,0 +1,114 @@
+"""States with a range: starts and checks stay within it, and what is positive stays so, however small."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import contfric as cf
+from contfric.errors import ModelError
+from contfric.models.check import Severity
+
+#: Pulse vaccination: between pulses the infectives fall by ten orders of magnitude and more.
+EPIDEMIC = """
+name: epidemic
+states: [S, I]
+parameters: {m: 0.02, b: 1800.0, g: 100.0, p: 0.5, Tv: 2.0}
+period: Tv
+modes: {all: {field: {S: m - b*S*I - m*S, I: b*S*I - (m + g)*I}}}
+resets: {tick: {S: (1 - p)*S}}
+"""
+
+#: A neuron that bursts: its gate has no meaning outside of 0 to 1, where the field would lead back.
+BURST = """
+name: burst
+states: [V, h]
+parameters: {I0: 0.2, I1: 0.6, f: 0.006}
+period: 1/f
+define: {I: I0 + I1*cos(2*pi*f*t)}
+surfaces: {threshold: {observable: V, level: -35}, gate: {observable: V, level: -60}}
+modes:
+  low: {in: {gate: -}, field: {V: (I - 0.035*(V + 65))/2, h: (1 - h)/100}}
+  high: {in: {gate: +, threshold: -}, field: {V: (I - 0.035*(V + 65) - 0.07*h*(V - 120))/2, h: -h/20}}
+resets: {threshold: {V: -50}}
+"""
+
+
+def written(folder: Path, text: str, spread: str = "") -> cf.Model:
+    path = folder / "model.yaml"
+    path.write_text(text + (f"spread: {spread}\n" if spread else ""), encoding="utf-8")
+    return cf.load_model(path)
+
+
+def pulsed(p: dict[str, float], y: np.ndarray) -> np.ndarray:
+    """Return the susceptibles and the logarithm of the infectives one period after a pulse, by scipy."""
+
+    def field(_t: float, y: np.ndarray) -> list[float]:
+        s, infectives = y[0], math.exp(y[1])
+        return [p["m"] - p["b"] * s * infectives - p["m"] * s, p["b"] * s - p["m"] - p["g"]]
+
+    after = solve_ivp(field, (0, p["Tv"]), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return np.array([(1 - p["p"]) * after[0], after[1]])
+
+
+@pytest.mark.parametrize(("p", "period"), [(0.5, 2.0), (0.505, 2.02), (0.4, 1.5)])
+def test_positive_states_keep_their_digits(tmp_path: Path, p: float, period: float) -> None:
+    model = written(tmp_path, EPIDEMIC, "{S: [0, 1], I: [0, 0.01]}")
+    orbit = cf.find_orbit(model, {"p": p, "Tv": period})
+    params = {**model.defaults, "p": p, "Tv": period}
+    susceptible, infectives = orbit.joints[0, 1:3]
+    start = np.array([(1 - p) * susceptible, math.log(infectives)])
+    assert round(orbit.period / period) == 1
+    np.testing.assert_allclose(pulsed(params, start), start, rtol=1e-8)
+    motion = cf.simulate(model, params, state=[0.06, 1e-4], periods=20)
+    assert np.all(motion.states[:, 1] > 0.0)
+    assert np.min(motion.sample(np.linspace(0, 10 * period, 200))[:, 1]) < 1e-7
+
+
+def test_starts_leave_what_stays_zero(tmp_path: Path) -> None:
+    model = written(tmp_path, EPIDEMIC)
+    assert cf.simulate(model, periods=1).begin[1][1] > 0.0
+    for name in ("coulomb", "relay"):  # nothing of them stays at 0
+        begin = cf.simulate(name, periods=1).begin[1]
+        assert np.count_nonzero(begin) == 1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_starts_and_checks_stay_within_ranges(tmp_path: Path, seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    low = draw.uniform(-90, -70)
+    model = written(tmp_path, BURST, f"{{V: [{low!r}, -35], h: [0, 1]}}")
+    report = cf.check_model(model)
+    assert report.ok, str(report)
+    assert not [f for f in report.findings if f.severity is Severity.WARNING], str(report)
+    y = cf.simulate(model, periods=1).begin[1]
+    assert low < y[0] < -35 and 0 < y[1] < 1
+
+
+def test_faults_that_nothing_meets_are_warnings(tmp_path: Path) -> None:
+    text = BURST.replace("(1 - h)/100", "(1 - h)/2")  # h > 0 long before the gate
+    report = cf.check_model(written(tmp_path, text, "{V: [-80, -75]}"))
+    assert report.ok, str(report)
+    assert any("simulations came to such a state" in f.message for f in report.findings)
+    report = cf.check_model(written(tmp_path, BURST, "{V: 80}"))  # starts with h < 0 do come there
+    assert any("from starts in the spread came" in f.message for f in report.findings)
+
+
+def test_ranges_have_units_and_names(tmp_path: Path) -> None:
+    text = EPIDEMIC.replace("p: 0.5", "p: 0.5, most: 0.02") + "units: {I: 0.001}\n"
+    model = written(tmp_path, text, "{I: [most/20, most], S: 3}")
+    low, high = model.region(model.vector({"most": 0.04}), 2.0)
+    k, s = model.states.index("I"), model.states.index("S")
+    np.testing.assert_allclose([low[k], high[k], low[s], high[s]], [2, 40, -6, 6])
+
+
+@pytest.mark.parametrize(
+    ("entry", "says"), [("[0, 1, 2]", "a lowest and"), ("[1, 0]", "from 1 to 0")]
+)
+def test_ranges_that_are_none(tmp_path: Path, entry: str, says: str) -> None:
+    with pytest.raises(ModelError, match=says):
+        written(tmp_path, EPIDEMIC, f"{{I: {entry}}}")
