@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
@@ -84,6 +83,8 @@ class _Parabola:
 
     def first_end(self) -> tuple[int, float] | None:
         """Return the margin that vanishes first, and where; None if none does so near."""
+        from scipy.optimize import brentq
+
         farthest = nearest(self.orbit)
         here, there = self.orbit.margins, self.at(farthest).margins
 
