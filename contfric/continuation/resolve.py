@@ -49,7 +49,8 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
         side.end = End(EndReason.POINT)
         return True
-    if _comes_closer(side, located, after.arc - before.arc):
+    missed = not located and limit is None and violates(after)
+    if _comes_closer(side, located, missed, after.arc - before.arc):
         return False
     if located and is_on_section(located[0][0]):
         side.drop_tip()
@@ -129,13 +130,17 @@ def _is_known(
     return is_known_touch(side, point)
 
 
-def _comes_closer(side: Side, located: list[tuple[Bifurcation, Point]], step: float) -> bool:
+def _comes_closer(
+    side: Side, located: list[tuple[Bifurcation, Point]], missed: bool, step: float
+) -> bool:
     """Go back to the point before an event near which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
-    across may end on the other curve, and what is between its ends belongs to neither.
+    across may end on the other curve, and what is between its ends belongs to neither. And where a slide has
+    exactly no length the equations may have no pivot by rounding: a condition that is violated after a step
+    is ``missed`` if its location is just that, and no other trial is solved as well.
     """
-    fails = any(point.lost or point.rough for _, point in located)
+    fails = missed or any(point.lost or point.rough for _, point in located)
     if not fails or step < NEAREST:
         return False
     side.drop_tip()

@@ -4,6 +4,10 @@ With the cosines and sines of all frequencies as further states the system is li
 coefficients (:mod:`contfric.models.linear_code`) are evaluated once a call; the *rate* of the system, a bound
 of how fast its Taylor terms grow, follows from a norm of the matrix in units of the states that make it small
 (Osborne's iteration) and from the frequencies whose factors are not zero.
+
+A sweep changes all units at once: each by the fourth root of the ratio of its row to its column. By the square
+root, as where one unit is changed at a time, both units of a pair such as a position and its velocity would
+take the whole step, and miss by as much as before: a beam took four times as many steps as it needs.
 """
 
 from __future__ import annotations
@@ -20,8 +24,10 @@ FloatArray = NDArray[np.float64]
 
 #: Sweeps of Osborne's iteration: units need to be right to a factor only.
 _SWEEPS = 3
-#: Largest change of a unit in a sweep where nothing holds it on one side (a rigid body).
-_FREE = 1e-2
+#: What stands for a row or a column without entries, against the other (a rigid body): a unit changes by ten.
+_FREE = 1e-4
+#: Largest ratio that a sweep takes: three of them spread units by 1e12, what the terms of a series allow for.
+_FARTHEST = 1e8
 #: Most terms of a series: three units of time over the rate need 30, derivatives by parameters more.
 TERMS = 40
 #: One over each whole number.
@@ -138,10 +144,10 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
             r, c = row[i] / units[i], column[i] * units[i]
             if not (r > 0.0 or c > 0.0):
                 continue
-            ratio = max(r, _FREE * c) / max(c, _FREE * r)
+            ratio = (r if r > 0.0 else _FREE * c) / (c if c > 0.0 else _FREE * r)
             if not 0.25 < ratio < 4.0:
                 settled = False
-                units[i] *= math.sqrt(ratio)
+                units[i] *= math.sqrt(math.sqrt(min(max(ratio, 1.0 / _FARTHEST), _FARTHEST)))
         if settled:
             break
     rows, columns, low, high = 0.0, 0.0, math.inf, 0.0
