@@ -205,17 +205,16 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     continuous = f"{kind.meaning}: the signature changes, the solution is continuous"
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
-    if is_crossed(bifurcation):
+    # where nothing jumps at rest nothing does here, whichever of several margins is met first
+    if orbit.model.filippov or is_crossed(bifurcation):
         return continuous
-    for location in locations_of(bifurcation)[: None if orbit.model.filippov else 1]:
+    for location in locations_of(bifurcation)[:1]:
         try:
             outcome_at(orbit.as_whole(), location, kind)
         except NoJump:
             return continuous
-        except NotationError:  # where nothing jumps: what is next to it, and is told of that
+        except NotationError:
             continue
-        if orbit.model.filippov:
-            return continuous
     return ""
 
 

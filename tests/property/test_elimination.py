@@ -48,7 +48,7 @@ def solve_chain(a, b, c, r, close, d, e, s, z, w):  # type: ignore[no-untyped-de
 def _weak(a: FloatArray, b: FloatArray, rng: np.random.Generator, both: bool) -> None:
     """Leave rounding as pivots of one unknown, and the same row as the only pivot of another one."""
     count, m, _ = a.shape
-    i, size = int(rng.integers(1, count)), float(10.0 ** rng.uniform(-18.0, -15.0))
+    i, size = int(rng.integers(1, count)), float(10.0 ** rng.uniform(-21.0, -18.0))
     k, other = (int(n) for n in rng.permutation(m)[:2])
     row = int(rng.integers(m))
     b[i - 1, :, k] = a[i, :, k] = 0.0
