@@ -5,9 +5,9 @@ coefficients (:mod:`contfric.models.linear_code`) are evaluated once a call; the
 of how fast its Taylor terms grow, follows from a norm of the matrix in units of the states that make it small
 (Osborne's iteration) and from the frequencies whose factors are not zero.
 
-A sweep changes all units at once: each by the fourth root of the ratio of its row to its column. By the square
-root, as where one unit is changed at a time, both units of a pair such as a position and its velocity would
-take the whole step, and miss by as much as before: a beam took four times as many steps as it needs.
+A sweep changes all units at once: each by the fourth root of the ratio of its row to its column. By the
+square root, as where one unit is changed at a time, both units of a pair such as a position and its velocity
+would take the whole step, and miss by as much as before: a beam took four times as many steps as it needs.
 """
 
 from __future__ import annotations
