@@ -319,7 +319,7 @@ def copied(data: dict[str, Any], count: int) -> dict[str, Any]:
         for i, c in enumerate(data["joints"])
     ]
     found["radius"] = [max(r, 1e-11) for r in data["radius"]] * count
-    found["enclosure"] = [f"{c!r} +/- 1e-10" for c in found["joints"]]
+    found["enclosure"] = [f"{float(c)!r} +/- 1e-10" for c in found["joints"]]
     found["multipliers"] = []
     return found
 
@@ -367,7 +367,7 @@ def _mirrored(data: dict[str, Any], rng: np.random.Generator) -> None:
         -c if k % 2 else c + later for k, c in enumerate(data["joints"][:count])
     ]
     data["radius"] = [max(r, 1e-11) for r in data["radius"]]
-    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+    data["enclosure"] = [f"{float(c)!r} +/- 1e-10" for c in data["joints"]]
 
 
 def _later(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -375,7 +375,7 @@ def _later(data: dict[str, Any], rng: np.random.Generator) -> None:
     turn = 2 * np.pi / data["params"]["Omega"] * float(rng.choice([-1, 1, 0.5, rng.uniform()]))
     data["joints"] = [c if k % 2 else c + turn for k, c in enumerate(data["joints"])]
     data["radius"] = [max(r, 1e-11) for r in data["radius"]]
-    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+    data["enclosure"] = [f"{float(c)!r} +/- 1e-10" for c in data["joints"]]
 
 
 def _one_more(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -390,7 +390,7 @@ def _one_more(data: dict[str, Any], rng: np.random.Generator) -> None:
     between = [a + share * (b - a) for a, b in zip(here, there, strict=True)]
     data["joints"][2 * i + 2 : 2 * i + 2] = between
     data["radius"][2 * i + 2 : 2 * i + 2] = [1e-6, 1e-6]
-    data["enclosure"][2 * i + 2 : 2 * i + 2] = [f"{c!r} +/- 1e-5" for c in between]
+    data["enclosure"][2 * i + 2 : 2 * i + 2] = [f"{float(c)!r} +/- 1e-5" for c in between]
 
 
 def _backwards(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -402,7 +402,7 @@ def _backwards(data: dict[str, Any], rng: np.random.Generator) -> None:
     pairs = list(zip(data["joints"][::2], data["joints"][1::2], strict=True))[::-1]
     data["joints"] = [c for t, x in pairs for c in (-t, x)]
     data["params"]["zeta"] *= -1
-    data["enclosure"] = [f"{c!r} +/- 1e-10" for c in data["joints"]]
+    data["enclosure"] = [f"{float(c)!r} +/- 1e-10" for c in data["joints"]]
 
 
 def _exchanged(data: dict[str, Any], rng: np.random.Generator) -> None:
