@@ -59,6 +59,8 @@ def partial_touches(
     touches = len(_passages(unit))
     for length in range(1, min(copies, most_periods // periods) + 1):
         if touches * length > _MOST_TOUCHES:
+            what = f"some of {touches * length} touches crossed"
+            yield Candidate(what, None, f"more than {_MOST_TOUCHES} touches are not looked at")
             return
         orbit = _repeated(unit, length)
         for kept in _choices(touches, length):

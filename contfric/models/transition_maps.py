@@ -165,9 +165,9 @@ class TransitionMaps(SectionMaps):
                 ]
                 for target in found:
                     key = tuple(target.signs[s.name] for s in self.surfaces)
-                    beside = self._domains_by_signs[key]
-                    fits = {d.mode for d in nearest(beside, domain.own_mode, self._side_of)}
-                    fits |= {d.mode for d in beside if d.mode == domain.mode}
+                    behind = self._domains_by_signs[key]
+                    fits = {d.mode for d in nearest(behind, domain.own_mode, self._side_of)}
+                    fits |= {d.mode for d in behind if d.mode == domain.mode}
                     named = {d.own_mode for d in found if d.signs == target.signs}
                     mapped = self.maps_at(domain, surface.name)
                     several = len(named) > 1 if mapped else len(fits) > 1

@@ -144,10 +144,13 @@ def displaced(model: Model, vector: FloatArray) -> FloatArray:
             y = np.where(clocks, rest, y)
             if _is_start(model, y, vector):
                 return y
-    within = ", ".join(f"|{s}| <= {w:g}" for s, w in zip(model.states, half_width, strict=True))
+    within = ", ".join(
+        f"{low:g} <= {state} <= {high:g}"
+        for state, low, high in zip(model.states, *model.region(vector), strict=True)
+    )
     raise ParameterError(
         f"no start was found: of {_DRAWS} states of '{model.name}' at t = 0 with {within}, its 'spread', and "
-        f"up to {_WIDER[-1]:g} times as far, none is in a domain. "
+        f"up to {_WIDER[-1]:g} times as far where it is no range, none is in a domain. "
         "Give one (state=...), or correct 'spread' or the sides of the modes"
     )
 
@@ -157,18 +160,18 @@ def _kept_zeros(model: Model) -> tuple[int, ...]:
     """Return the states (not the first) that stay 0 for ever if they are 0: infectives, a mass."""
     if model.composed or not model.definition:
         return ()
-    probe = Probe(model, model.defaults)
+    probe = Probe(model, model.defaults)  # which compiles no flow
     return tuple(k for k in range(1, len(model.states)) if _stays_zero(probe, k))
 
 
 def _stays_zero(probe: Probe, k: int) -> bool:
     """Tell whether a state that is 0 stays so for ever, in all modes and resets."""
     model, rng = probe.model, np.random.default_rng(1)
-    modes = [m.name for m in model.modes]
+    modes = [m.name for m in model.modes if m.name not in model.chatter_by_mode]
     for _ in range(_DRAWN):
         t, y = rng.uniform(), rng.uniform(*model.region(probe.vector))
         y[k] = 0.0
-        if any(m not in model.chatter_by_mode and probe.field(m, t, y)[k] != 0.0 for m in modes):
+        if any(probe.field(mode, t, y)[k] != 0.0 for mode in modes):
             return False
         if any(probe.reset(reset.surface, t, y)[k] != 0.0 for reset in model.resets):
             return False

@@ -16,9 +16,6 @@ from contfric.models.definition import FloatArray
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
-#: Halvings of a step of at most an eighth of a segment: what is left is a rounding error of its length.
-_HALVINGS = 50
-
 
 @dataclass(frozen=True)
 class DomainPiece:
@@ -45,7 +42,7 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
         count = max(9, int(np.ceil(points * (end[0] - start[0]) / orbit.period)))
         times = np.linspace(start[0], end[0], count)
         states = np.array([start[1:], *(orbit.state(t) for t in times[1:-1]), end[1:]])
-        cuts = [*_crossings(orbit, times, states), (float(end[0]), exit_)]
+        cuts = [*_crossings(orbit, mode, times, states), (float(end[0]), exit_)]
         before = float(start[0])
         for time, surface in cuts:
             inside = (times > before) & (times < time)
@@ -62,43 +59,26 @@ def pieces_of(orbit: Orbit, points: int = 400) -> list[DomainPiece]:
     return found
 
 
-def _crossings(orbit: Orbit, times: FloatArray, states: FloatArray) -> list[tuple[float, str]]:
+def _crossings(
+    orbit: Orbit, mode: str, times: FloatArray, states: FloatArray
+) -> list[tuple[float, str]]:
     """Return times at which transparent surfaces are crossed inside a segment, in order."""
     found: list[tuple[float, str]] = []
     for surface in orbit.model.surfaces:
         if surface.switching and surface.name not in orbit.model.section_surfaces:
             continue
-        name, limit = surface.name, orbit.flow.level(surface.name)
-        seen = [
-            orbit.flow.observe(surface.observable, t, y) for t, y in zip(times, states, strict=True)
-        ]
+        observable, limit = surface.observable, orbit.flow.level(surface.name)
+        seen = [orbit.flow.observe(observable, t, y) for t, y in zip(times, states, strict=True)]
         gap = np.array(seen) - limit
         # a sample on the surface (a joint, or the middle of a solution) has no side
         sided = np.flatnonzero(np.abs(gap) >= 1e-9 * (1.0 + abs(limit)))
         for k in np.flatnonzero(gap[sided[:-1]] * gap[sided[1:]] < 0.0):
-            low, high = (float(times[place]) for place in sided[k : k + 2])
-            found.append((_crossing(orbit, name, low, high), name))
+            low, high = sided[k : k + 2]
+            start, lasts = float(times[low]), float(times[high] - times[low])
+            met = orbit.flow.first(mode, observable, limit, start, states[low], lasts, on=False)
+            if met is not None:
+                found.append((start + met[0], surface.name))
     return sorted(found)
-
-
-def _crossing(orbit: Orbit, surface: str, low: float, high: float) -> float:
-    """Return a time between two others, of which one is above a surface and one below.
-
-    Halving needs nothing but signs; ``scipy.optimize`` takes longer to load than both figures of an orbit
-    and a diagram to draw.
-    """
-    rises = _height(orbit, surface, low) < 0.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if (_height(orbit, surface, middle) < 0.0) == rises:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
-def _height(orbit: Orbit, surface: str, time: float) -> float:
-    return orbit.flow.height(surface, time, orbit.state(time))
 
 
 def _domain(orbit: Orbit, mode: str, time: float) -> str:

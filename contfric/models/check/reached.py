@@ -6,6 +6,7 @@ simulation meets such a fault, else a warning.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,7 +47,8 @@ def report_fault(report: ModelReport, probe: Probe, topic: Topic, message: str) 
         )
 
 
-def _ends(probe: Probe) -> list[bool]:
+@lru_cache(maxsize=1)  # the same simulations for every fault of a model
+def _ends(probe: Probe) -> tuple[bool, ...]:
     """Return of each simulation whether it came to where motion cannot go on; nothing if none could start."""
     from contfric.orbit.simulation import SimulationEnd, simulate
 
@@ -62,7 +64,7 @@ def _ends(probe: Probe) -> list[bool]:
         except ContfricError:  # beyond a wall, or in no domain
             continue
         found.append(motion.end is SimulationEnd.IMPOSSIBLE or _is_outside(probe, motion))
-    return found
+    return tuple(found)
 
 
 def _is_outside(probe: Probe, motion: Trajectory) -> bool:
