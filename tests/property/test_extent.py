@@ -185,5 +185,5 @@ def test_a_start_is_found_where_the_first_one_is_in_no_domain(tmp_path: Path) ->
     assert y[1] < 0.0
     # and where there is none, it is said what was tried
     nowhere = replace(model, domains=(), spread=lambda _: np.array([0.5, 0.5]))
-    with pytest.raises(cf.ParameterError, match=r"1000 states .*\|x\| <= 0.5.*state="):
+    with pytest.raises(cf.ParameterError, match=r"1000 states .*-0\.5 <= x <= 0\.5.*state="):
         displaced(nowhere, vector)
