@@ -1,7 +1,7 @@
 """Motion on a belt that touches the belt's velocity, where friction does not jump at rest.
 
-There a stick comes in for no time. Where the smooth orbit is unstable, orbits of several of its periods stick in
-some of them only: all of them meet at the touch, whichever of them a diagram is started from.
+There a stick comes in for no time. Where the smooth orbit is unstable, orbits of several of its periods stick
+in some of them only: all of them meet at the touch, whichever of them a diagram is started from.
 """
 
 from __future__ import annotations
