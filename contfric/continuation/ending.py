@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.continuation.holdable import NoJump
 from contfric.continuation.limits import limit_end
 from contfric.continuation.locations import locations_of
-from contfric.continuation.outcomes import NoJump, outcome_at
+from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import Side
 from contfric.continuation.touching import entered_at, is_crossed, thrown_at

@@ -46,8 +46,9 @@ _NEARLY = 1e-6
 _FAR = 1e-5
 #: Most forms of a unit: six locations with two outcomes each.
 _MOST_FORMS = 64
-#: Where in a segment it is asked how far something has moved, as shares of it.
-_SHARES = (0.25, 0.5, 1.0)
+#: Where in a segment it is asked how far something has moved, as shares of it. One is irrational (the golden
+#: section's), as a segment may last whole periods of what it is a part of.
+_SHARES = (0.236067977499790, 0.5, 1.0)
 
 
 @dataclass(frozen=True)

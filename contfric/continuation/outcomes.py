@@ -14,6 +14,7 @@ GS, an impact has no speed any more    drop it: the segment goes on
 AS, a stick is released tangentially   insert a hold of length zero after it
 AS, a stick touches F inside           split it there: a hold goes on
 GS, a slide touches rest inside        split it there: insert a hold of length zero
+the same, and nothing jumps            split it there: insert a stick of length zero
 GS, a slide stops tangentially         the stick after it becomes a hold
 a hold has no length any more          drop it: the regular orbit with the earlier outcome
 a hold reaches its regular release     it becomes a stick: the regular orbit with the later outcome
@@ -27,7 +28,8 @@ Where a stick becomes a hold, the hold lasts to the release, unless before that 
 more: there it ends, with a slide of length zero, and the rest of the stick follows.
 
 Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
-of Filippov): rest whose load touches its limit slips there for no time. Where nothing else is known,
+of Filippov): rest whose load touches its limit slips there for no time, and a slide that touches rest sticks
+there for no time (:mod:`contfric.continuation.standing_slides`). Where nothing else is known,
 :mod:`contfric.continuation.from_simulation` lets the flow itself say what follows.
 """
 
@@ -39,10 +41,10 @@ from dataclasses import dataclass, field
 from contfric.continuation import standing_slides as slides
 from contfric.continuation.composed_outcomes import continuous_edit
 from contfric.continuation.events import Kind
+from contfric.continuation.holdable import NoJump, check_held, check_inside, rest_mode
 from contfric.continuation.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.continuation.zero_acceleration import (
     first_zero_acceleration,
-    leaving_rate,
     touch_of,
     touches_again,
 )
@@ -50,7 +52,6 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
-from contfric.orbit.starts import signs_at
 from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
@@ -60,9 +61,6 @@ NO_LENGTH = 1e-6
 #: The same for a hold at a touch of rest, which is left with an acceleration that grows from zero: what it
 #: does to the orbit is the square of its length, so that it is located to the root.
 NO_LENGTH_AT_TOUCH = 1e-4
-#: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
-#: region (nondimensional), has no jump: far above rounding, far below any difference of two limits.
-NO_JUMP = 1e-9
 #: A slide between two holds vanishes with a double zero: it is located to the root of that.
 NEARLY_NO_LENGTH = 1e-3
 
@@ -78,10 +76,6 @@ Origin = tuple[int, int]
 
 class RestsForEver(NotationError):
     """Nothing follows an event because nothing moves any more."""
-
-
-class NoJump(NotationError):
-    """Nothing can be held at an event: the solution there is continuous."""
 
 
 @dataclass(frozen=True)
@@ -158,8 +152,8 @@ def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Outcome:
     j = (i + 1) % len(itinerary)
     if slides.goes_nowhere(orbit, j):
         return Outcome(*slides.left_out(orbit, j))
-    rest = _rest_mode(orbit, i, itinerary[i][1])
-    _check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
+    rest = rest_mode(orbit, i, itinerary[i][1])
+    check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
     if model.lies_on(itinerary[j][0], itinerary[i][1]):
         return _stick_becomes_hold(orbit, j, hold_at(location.surface), location.surface)
     edit = insert(i, (rest, hold_at(location.surface)))
@@ -171,12 +165,12 @@ def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     """GS: a stop without acceleration."""
     itinerary, i = orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
-    _rest_mode(orbit, i, itinerary[i][1])
+    rest_mode(orbit, i, itinerary[i][1])
     if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
     if slides.only_touches(orbit, j):
         return Outcome(*slides.touch_alone(orbit, j))
-    _check_inside(orbit, itinerary[j][0], orbit.ends[i])
+    check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
 
@@ -185,7 +179,7 @@ def _released_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     i, (mode, exit_) = location.segment, orbit.itinerary[location.segment]
     if slides.only_touches(orbit, i + 1):
         return Outcome(*slides.touch_alone(orbit, (i + 1) % len(orbit.itinerary)))
-    _check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
+    check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
     reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
     return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
@@ -207,7 +201,7 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     departs = _released(model, mode, location.surface)
     if model.filippov:
         return Outcome(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
-    _check_held(orbit, mode, departs, touch)
+    check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
@@ -227,8 +221,10 @@ def _rest_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     i = location.segment
     mode, exit_ = orbit.itinerary[i]
     touch = touch_of(orbit, i, location.surface)
-    rest = _rest_mode(orbit, i, location.surface)
-    _check_inside(orbit, rest, touch)
+    rest = rest_mode(orbit, i, location.surface)
+    if orbit.model.filippov:
+        return Outcome(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
+    check_inside(orbit, rest, touch)
     edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))
     reason = f"hold at the touch of rest in slide {i + 1}"
     return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
@@ -360,40 +356,3 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
         raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
     reason = f"no impact on {location.surface} after segment {i + 1}"
     return Outcome(*slides.runs_on(orbit, i, behind), reason)
-
-
-def _check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
-    """Check that rest would be left with an acceleration: only then can it be held."""
-    jumps = not orbit.model.filippov  # else a rate is rounding, however large
-    if departs is not None and not (jumps and leaving_rate(orbit, rest, departs, joint) > NO_JUMP):
-        raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
-
-
-def _check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
-    """Check that a state lies inside the region of a rest, not on its boundary.
-
-    A surface on which the state lies does not bound it where both of its sides are of the rest: where a mass
-    rests that a gap ends at, the rate of that gap is zero.
-    """
-    model = orbit.model
-    location = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
-    own = [domain.signs for domain in model.domains_of(rest)]
-    for signs in own:
-        sides = {s: sign for s, sign in signs.items() if sign != 0}
-        met = [s for s in sides if location[s] == 0]
-        inside = all(location[s] in (side, 0) for s, side in sides.items())
-        if inside and all({**signs, s: -sides[s]} in own for s in met):
-            return
-    raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
-
-
-def _rest_mode(orbit: Orbit, i: int, surface: str) -> str:
-    """Return the mode of rest on a surface that a slide comes to at its end, or at a touch of it."""
-    model = orbit.model
-    for domain in model.domains_of(model.whole_mode(orbit.itinerary[i][0])):
-        for through, target in model.exits_of(domain.name):
-            rest = model.domain_by_name[target].mode
-            if through == surface and model.lies_on(rest, surface):
-                return rest
-    mode = orbit.itinerary[i][0]
-    raise NoJump(f"mode '{mode}' of model '{model.name}' never comes to rest on {surface}")

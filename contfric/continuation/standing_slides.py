@@ -6,17 +6,20 @@ nothing its margins and those of the stops at both of its ends vanish together, 
 number. So which of them is located first is rounding. It is one event: at the stop before the slide the load
 is at its limit (SS). Without the slide the solution is the same.
 
-Motion that just touches a surface on which it could slide does so for no time, and goes on as before.
-And rest whose load just touches its limit slips for no time.
+Motion that just touches a surface on which it could slide does so for no time, and goes on as before: it has
+two forms, with that stick of no length and without. And rest whose load just touches its limit slips for no
+time.
 """
 
 from __future__ import annotations
 
+from contfric.continuation.holdable import NO_JUMP, NoJump
 from contfric.continuation.touching import rate_along
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
+from contfric.orbit.starts import signs_at
 from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, drop, split
 from contfric.signature.holds import is_hold, left_surface
@@ -28,6 +31,9 @@ _TOUCHES = 1e-4
 
 #: Where a load just exceeds its limit, the acceleration ``k (d^2 - t^2) / 2``, a slip from -d ends at 2d.
 _SLIPS = (-1.0, 2.0)
+#: Where a slide just passes rest, its velocity ``e - k t^2 / 2``, a stick from -d is left at 0: its load
+#: comes back to the limit there, as the acceleration of the slide does.
+_STICKS = (-1.0, 0.0)
 
 
 def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
@@ -103,3 +109,32 @@ def slip_at_touch(
     away = {(i, 0): _SLIPS[0], (i, 1): _SLIPS[1]}
     reason = f"slip at the touch of {surface} in stick {i + 1}"
     return split(i, surface, left, (mode, exit_)), {(i, 0): touch, (i, 1): touch}, reason, away
+
+
+def stick_at_touch(
+    orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray
+) -> tuple[Edit, dict[tuple[int, int], FloatArray], str, dict[tuple[int, int], float]]:
+    """Return the edit that lets slide ``i`` stick for no time where it touches rest.
+
+    With the joints, a reason, and how fast the joints move in time when the stick opens.
+
+    Raises
+    ------
+    NotationError
+        If such a stick is at this touch already, or would not be left there.
+    """
+    model, (mode, exit_) = orbit.model, orbit.itinerary[i]
+    short = _TOUCHES * time_unit(orbit)
+    began, ended = touch[0] - orbit.begins[i, 0] < short, orbit.ends[i, 0] - touch[0] < short
+    if (began and only_touches(orbit, i - 1)) or (ended and only_touches(orbit, i + 1)):
+        raise NotationError(f"the stick beside slide {i + 1} is at this touch of {surface}")
+    signs = signs_at(model, float(touch[0]), touch[1:].copy(), orbit.vector, within=NO_JUMP)
+    for domain in model.domains_of(rest):
+        for back, target in model.exits_of(domain.name):
+            own = model.domain_by_name[target].mode == model.whole_mode(mode)
+            if own and signs[back] == 0:
+                edit = split(i, surface, (rest, back), (mode, exit_))
+                away = {(i, 0): _STICKS[0], (i, 1): _STICKS[1]}
+                reason = f"stick at the touch of rest in slide {i + 1}"
+                return edit, {(i, 0): touch, (i, 1): touch}, reason, away
+    raise NoJump(f"'{rest}' is not left to '{mode}' where slide {i + 1} touches {surface}")
