@@ -22,9 +22,9 @@ from contfric.continuation.events import (
     Bifurcation,
     End,
     EndReason,
+    Fate,
     Kind,
     Proposal,
-    ProposalVerdict,
 )
 from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
@@ -86,7 +86,7 @@ class Exploration:
         """Register a branch that starts at an event, and why it was tried."""
         index = len(self.branches)
         with held_back():
-            self.judge(event, reason, ProposalVerdict.ACCEPTED, index)
+            self.judge(event, reason, Fate.ACCEPTED, index)
             self._register(branch)
             if index not in event.branches:
                 event.branches.append(index)
@@ -107,13 +107,13 @@ class Exploration:
         self,
         event: Event,
         reason: str,
-        verdict: ProposalVerdict,
+        verdict: Fate,
         branch: int | None = None,
         why: str = "",
     ) -> None:
         """Keep what became of a candidate."""
         event.proposals.append(Proposal(reason, verdict, branch, why))
-        if verdict is ProposalVerdict.KNOWN and branch is not None and branch not in event.branches:
+        if verdict is Fate.KNOWN and branch is not None and branch not in event.branches:
             event.branches.append(branch)
 
     def _meet(self, bifurcation: Bifurcation, index: int) -> None:
@@ -130,7 +130,7 @@ class Exploration:
         self.events.append(event)
         if not bifurcation.located:
             why = "not located: Newton fails after this point"
-            self.judge(event, "go on after the event", ProposalVerdict.REFUSED, why=why)
+            self.judge(event, "go on after the event", Fate.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
 

@@ -134,7 +134,7 @@ class EndReason(str, Enum):
 ACCURACY = 1e-8
 
 
-class ProposalVerdict(str, Enum):
+class Fate(str, Enum):
     """What became of a candidate."""
 
     ACCEPTED = "accepted"
@@ -155,7 +155,7 @@ class Proposal:
     """
 
     reason: str
-    verdict: ProposalVerdict
+    verdict: Fate
     branch: int | None = None
     why: str = ""
 
