@@ -10,11 +10,11 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
     Bifurcation,
+    Decision,
     End,
     EndReason,
     Kind,
     Proposal,
-    Verdict,
 )
 from contfric.continuation.points import Settings
 from contfric.models.definition import Model
@@ -222,7 +222,7 @@ def _is_followed(events: list[Event], settings: Settings, index: int, end: End) 
             or same_event(event.bifurcation, end.bifurcation, settings.parameter, settings.width)
         ):
             through = event.bifurcation.symmetric and any(
-                p.verdict is Verdict.KNOWN for p in event.proposals
+                p.verdict is Decision.KNOWN for p in event.proposals
             )
             return len(event.branches) > 1 or through  # through: its mirror image goes on
     return False

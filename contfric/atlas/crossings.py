@@ -10,7 +10,7 @@ from contfric.atlas.exploration import Exploration
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
 from contfric.continuation.crossing_ends import starts_along
-from contfric.continuation.events import EndReason, Verdict
+from contfric.continuation.events import Decision, EndReason
 from contfric.continuation.points import Settings, settings_of
 from contfric.continuation.switching import leave_along
 from contfric.continuation.trace import follow_orbit
@@ -41,7 +41,7 @@ def follow_crossing(state: Exploration, crossing: Crossing, event: Event, depart
             )
             text = "the branch that leaves along the null vector"
             if (index := next(known, None)) is not None:
-                state.judge(event, text, Verdict.KNOWN, index)
+                state.judge(event, text, Decision.KNOWN, index)
             else:
                 depart(state, crossing.orbit, event, EndReason.BP, way)
 
@@ -65,11 +65,11 @@ def _follow_through(
         if branch is not None:
             known = state.known(branch[len(branch) // 2])
         if known is not None or branch is None:
-            state.judge(event, reason, Verdict.KNOWN, known)
+            state.judge(event, reason, Decision.KNOWN, known)
         else:
             state.accept(event, reason, branch)
         return
-    state.judge(event, reason, Verdict.REFUSED, why="no orbit near the event was found")
+    state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
 
 
 def whole_branch(orbit: Orbit, settings: Settings) -> Branch:

@@ -12,7 +12,7 @@ from contfric.atlas.matching import same_kind, same_location
 from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
-from contfric.continuation.events import End, EndReason, Kind, Verdict
+from contfric.continuation.events import Decision, End, EndReason, Kind
 from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.resolve import violates
 from contfric.continuation.side import Side
@@ -46,7 +46,7 @@ def follow_departure(
         return
     for departure, distance, known in _departures(orbit, settings, reason, direction, state.known):
         if known is not None:
-            state.judge(event, text, Verdict.KNOWN, known)
+            state.judge(event, text, Decision.KNOWN, known)
             return
         side = trace_side(
             orbit,
@@ -59,7 +59,7 @@ def follow_departure(
             first = first_end(reason, event, side, settings)
             state.accept(event, text, assemble(orbit, settings, side, first, departure.origin))
             return
-    state.judge(event, text, Verdict.REFUSED, why="it is not admissible")
+    state.judge(event, text, Decision.REFUSED, why="it is not admissible")
 
 
 def _departures(

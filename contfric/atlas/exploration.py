@@ -20,11 +20,11 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
     Bifurcation,
+    Decision,
     End,
     EndReason,
     Kind,
     Proposal,
-    Verdict,
 )
 from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
@@ -86,7 +86,7 @@ class Exploration:
         """Register a branch that starts at an event, and why it was tried."""
         index = len(self.branches)
         with held_back():
-            self.judge(event, reason, Verdict.ACCEPTED, index)
+            self.judge(event, reason, Decision.ACCEPTED, index)
             self._register(branch)
             if index not in event.branches:
                 event.branches.append(index)
@@ -107,13 +107,13 @@ class Exploration:
         self,
         event: Event,
         reason: str,
-        verdict: Verdict,
+        verdict: Decision,
         branch: int | None = None,
         why: str = "",
     ) -> None:
         """Keep what became of a candidate."""
         event.proposals.append(Proposal(reason, verdict, branch, why))
-        if verdict is Verdict.KNOWN and branch is not None and branch not in event.branches:
+        if verdict is Decision.KNOWN and branch is not None and branch not in event.branches:
             event.branches.append(branch)
 
     def _meet(self, bifurcation: Bifurcation, index: int) -> None:
@@ -130,7 +130,7 @@ class Exploration:
         self.events.append(event)
         if not bifurcation.located:
             why = "not located: Newton fails after this point"
-            self.judge(event, "go on after the event", Verdict.REFUSED, why=why)
+            self.judge(event, "go on after the event", Decision.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
 

@@ -19,7 +19,7 @@ from contfric.atlas.leaving_event import first_end, settings_for
 from contfric.atlas.lines import ways_in_plane
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
-from contfric.continuation.events import EndReason, Kind, Verdict
+from contfric.continuation.events import Decision, EndReason, Kind
 from contfric.continuation.points import Point
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.side import first_point
@@ -71,7 +71,7 @@ def follow_arms(state: Exploration, event: Event) -> bool:
         if many > MOST_SEQUENCES or not near:
             why = f"{many} sequences: more than {MOST_SEQUENCES} are not tried"
             why = why if near else "the arms were not found next to the fold"
-            state.judge(event, f"orbits of {length} units", Verdict.REFUSED, why=why)
+            state.judge(event, f"orbits of {length} units", Decision.REFUSED, why=why)
             continue
         for sequence in necklaces(arms.letters, length):
             exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
@@ -102,7 +102,7 @@ def _try_arms(
         if not (there.converged and there.admissible):
             continue
         if (known := state.known(there)) is not None:
-            state.judge(event, reason, Verdict.KNOWN, known)
+            state.judge(event, reason, Decision.KNOWN, known)
             return
         settings = settings_for(there, state.settings)
         beyond = there if sequence == exchanged else arms.orbit(exchanged)
@@ -113,7 +113,7 @@ def _try_arms(
         if point is not None:
             _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)
             return
-    state.judge(event, reason, Verdict.REFUSED, why="no admissible orbit next to the fold")
+    state.judge(event, reason, Decision.REFUSED, why="no admissible orbit next to the fold")
 
 
 def _reason(arms: Arms, sequence: tuple[int, ...]) -> str:
@@ -140,7 +140,7 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
             if not there.admissible or off is orbit.system.half:
                 continue
             if (known := state.known(there)) is not None:
-                state.judge(event, reason, Verdict.KNOWN, known)
+                state.judge(event, reason, Decision.KNOWN, known)
                 return
             _add_crossing(state, event, orbit, point, reason)
             return

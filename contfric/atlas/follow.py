@@ -34,7 +34,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
-from contfric.continuation.events import ACCURACY, TERMINAL, End, EndReason, Kind, Verdict
+from contfric.continuation.events import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.continuation.from_simulation import walked
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.partial_touches import partial_touches
@@ -87,11 +87,11 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
     if any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests):
-        state.judge(event, "go on after the event", Verdict.REFUSED, why=_INCOMPLETE)
+        state.judge(event, "go on after the event", Decision.REFUSED, why=_INCOMPLETE)
         return
     if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):
         reason, why = "go on after the event", EndReason.CONTINUUM.value
-        state.judge(event, reason, Verdict.REFUSED, why=why)
+        state.judge(event, reason, Decision.REFUSED, why=why)
         return
     active = orbit.model.index_of(state.settings.parameter)
     edits = bool(orbit.model.resets) or any(m.sliding for m in orbit.model.modes)  # else no rest
@@ -118,9 +118,9 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
                 state.waiting.appendleft(event)
                 return
             if composes(orbit) and goes_on(state, event):
-                state.judge(event, "other orders of the changes", Verdict.REFUSED, why=GOES_ON)
+                state.judge(event, "other orders of the changes", Decision.REFUSED, why=GOES_ON)
                 break
-            if event.proposals and event.proposals[-1].verdict is not Verdict.REFUSED:
+            if event.proposals and event.proposals[-1].verdict is not Decision.REFUSED:
                 itineraries |= candidate.itineraries
         follow_beside_family(state, event)
         event.kinds |= {
@@ -168,13 +168,13 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             continue
         done.add(itinerary)
         if (known := state.known(branch[len(branch) // 2])) is not None:
-            state.judge(event, reason, Verdict.KNOWN, known)
+            state.judge(event, reason, Decision.KNOWN, known)
         else:
             state.accept(event, reason, branch)
             for end in ends:
                 state.merge(event, end)
     for itinerary in (w for w in refused if w not in done):
-        state.judge(event, reason, Verdict.REFUSED, why=refused[itinerary])
+        state.judge(event, reason, Decision.REFUSED, why=refused[itinerary])
     # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere
     alone = creeps == refused.keys() or len(orbit.system.layout.conserved) > 0
     if creeps and alone and not done and len(event.branches) == 1:
@@ -208,13 +208,13 @@ def _meeting(
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
     """Try one candidate; return whether a branch of it meets the event."""
     if candidate.orbit is None:
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=candidate.refusal)
+        state.judge(event, candidate.reason, Decision.REFUSED, why=candidate.refusal)
         event.final = EndReason.REST if candidate.rest else event.final
         return candidate.rest
     known = state.ends_here(candidate.orbit, event)
     if known is not None:
         arrived = event.branches[:1] == [known]
-        state.judge(event, candidate.reason, Verdict.KNOWN, known)
+        state.judge(event, candidate.reason, Decision.KNOWN, known)
         return not arrived
     return _try(state, event, candidate)
 
@@ -227,7 +227,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         return True
     fault = fault_of_itinerary(candidate.orbit)
     if fault is not None and not _begins_continuum(state, candidate.orbit, event):
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)  # whatever is traced
+        state.judge(event, candidate.reason, Decision.REFUSED, why=fault)  # whatever is traced
         return False
     if (met := follow_short(state, candidate, event)) is not None:
         return met
@@ -239,7 +239,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
             branch = None
         known = None if branch is None else state.known(branch[len(branch) // 2])
         if known is not None:
-            state.judge(event, candidate.reason, Verdict.KNOWN, known)
+            state.judge(event, candidate.reason, Decision.KNOWN, known)
             return True
     if branch is not None and _has_no_width(branch, event, state.settings):
         assert candidate.orbit is not None
@@ -247,23 +247,23 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         branch = leave_singular(state, candidate.orbit, event, own) or branch
     fault = None if branch is None else fault_of(branch, state.settings.width)
     if fault is not None:
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=fault)
+        state.judge(event, candidate.reason, Decision.REFUSED, why=fault)
         return False
     if branch is not None and _has_no_width(branch, event, state.settings):
         why = "it begins and ends at the event, without any width"
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        state.judge(event, candidate.reason, Decision.REFUSED, why=why)
         return False
     if branch is not None and (found := state.known(branch[len(branch) // 2])) is not None:
         if any(ends_at(end, event, state.settings) for end in state.branches[found].ends):
-            state.judge(event, candidate.reason, Verdict.KNOWN, found)
+            state.judge(event, candidate.reason, Decision.KNOWN, found)
             return True
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=_ELSEWHERE)
+        state.judge(event, candidate.reason, Decision.REFUSED, why=_ELSEWHERE)
         return False
     if branch is None:
         why = "no admissible orbit beyond the event"
         if _begins_continuum(state, candidate.orbit, event):
             why = EndReason.CONTINUUM.value
-        state.judge(event, candidate.reason, Verdict.REFUSED, why=why)
+        state.judge(event, candidate.reason, Decision.REFUSED, why=why)
         return False
     branch, ends = _located_by(state, branch, event)
     branch = from_admissible(branch, candidate.orbit) if not ends else branch
@@ -344,9 +344,9 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
     reason = "the branch that goes on through the event"
     branch = _through(state, orbit)
     if branch is None:
-        state.judge(event, reason, Verdict.REFUSED, why="no orbit near the event was found")
+        state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
     elif (known := state.known(branch[len(branch) // 2])) is not None:
-        state.judge(event, reason, Verdict.KNOWN, known)
+        state.judge(event, reason, Decision.KNOWN, known)
     else:
         state.accept(event, reason, branch)
 
@@ -377,6 +377,6 @@ def _follow_doubling(state: Exploration, event: Event) -> None:
     if 2 * orbit.periods > state.max_periods:
         why = f"max_periods = {state.max_periods}"
         reason = f"the branch of {2 * orbit.periods} periods"
-        state.judge(event, reason, Verdict.REFUSED, why=why)
+        state.judge(event, reason, Decision.REFUSED, why=why)
         return
     follow_departure(state, orbit.doubled(), event, EndReason.PD)

@@ -28,7 +28,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate
 from contfric.continuation.doubling_point import solved_at_vertex
-from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind, Verdict
+from contfric.continuation.events import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import bifurcation_at
@@ -129,7 +129,7 @@ def leave_short(state: Exploration, orbit: Orbit, event: Event, end: EndReason, 
     if short is None:
         return False
     if (known := _known(state, short)) is not None:
-        state.judge(event, text, Verdict.KNOWN, known)
+        state.judge(event, text, Decision.KNOWN, known)
     else:
         state.accept(event, text, short)
     return True
@@ -145,7 +145,7 @@ def follow_short(state: Exploration, candidate: Candidate, event: Event) -> bool
     if short is None:
         return None
     if (known := _known(state, short)) is not None:
-        state.judge(event, candidate.reason, Verdict.KNOWN, known)
+        state.judge(event, candidate.reason, Decision.KNOWN, known)
         return event.branches[:1] != [known]
     state.accept(event, candidate.reason, short)
     state.merge(event, short.ends[1])
@@ -191,7 +191,7 @@ def begins_at_short(state: Exploration, event: Event) -> None:
             if gap < near and other.outline.apart(b.outline) < near:
                 state.end_at(index, k, event)
                 text = "the bridge that begins just after it"
-                state.judge(event, text, Verdict.KNOWN, index)
+                state.judge(event, text, Decision.KNOWN, index)
                 return
 
 

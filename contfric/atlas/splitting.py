@@ -10,7 +10,7 @@ from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.departures import ends_at
 from contfric.atlas.exploration import Exploration
-from contfric.continuation.events import Kind, Verdict
+from contfric.continuation.events import Decision, Kind
 from contfric.continuation.points import next_to
 from contfric.continuation.split_touch import pinned_first, splits
 from contfric.orbit.orbit import Orbit
@@ -36,7 +36,7 @@ def follow_split(state: Exploration, event: Event) -> bool:
             continue
         state.accept(event, _REASON, branch)
         return True
-    state.judge(event, _REASON, Verdict.REFUSED, why="no orbit on the other side was found")
+    state.judge(event, _REASON, Decision.REFUSED, why="no orbit on the other side was found")
     return False
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from contfric.base.yaml_lines import as_truth, comma_hint
 from contfric.errors import did_you_mean, shown
@@ -31,6 +31,38 @@ class SchemaPart(BaseModel):
     model_config = ConfigDict(
         extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True
     )
+
+
+def whole(
+    what: str = "", *, least: int = 1, most: int | None = None, default: int | None = None
+) -> Any:
+    """Return the field of a whole number; its limits stand in its description as well.
+
+    Examples
+    --------
+    >>> whole("periods", most=16).description
+    'a whole number from 1 to 16: periods'
+    """
+    limits = (
+        f"a whole number >= {least}" if most is None else f"a whole number from {least} to {most}"
+    )
+    return Field(default, ge=least, le=most, description=_said(limits, what))
+
+
+def positive(what: str = "", *, most: float | None = None) -> Any:
+    """Return the field of a number above 0 that may be left out.
+
+    Examples
+    --------
+    >>> positive("largest step", most=1.0).description
+    'a number in (0, 1]: largest step'
+    """
+    limits = "a number > 0" if most is None else f"a number in (0, {most:g}]"
+    return Field(None, gt=0.0, le=most, description=_said(limits, what))
+
+
+def _said(limits: str, what: str) -> str:
+    return f"{limits}: {what}" if what else limits
 
 
 #: What pydantic calls a key that a part does not have; the second is no text.

@@ -21,7 +21,7 @@ from contfric.certify.inequalities import DURATION, INSIDE, JOINT
 from contfric.certify.piece import Piece
 from contfric.continuation.events import TERMINAL, EndReason
 from contfric.models.balls.numbers import working
-from contfric.verify.curve import Box, check_admissible
+from contfric.verify.curve import Link, check_admissible
 from contfric.verify.file import BITS, CHECKED_MODELS, FORMAT, check_text, events_between, orbits_at
 from contfric.verify.motion import Refused, Undecided
 
@@ -64,7 +64,7 @@ class _GrowingTube:
     def __init__(self, data: dict[str, Any], start: _Row, until: float) -> None:
         self.data, self.until = data, until
         self.rows, self.kinds, self.ends = [start], list[list[str]](), list[Any]([None, None])
-        self.point: Box | None = None
+        self.point: Link | None = None
         self.tried, self.length, self.steady, self.why = 0, math.inf, _STEADY, ""
         self.longest = 0.0  # box that was decided
 

@@ -17,7 +17,7 @@ import numpy as np
 from contfric.continuation.conditions import Relation, possible, relation_of
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.incident import Incident, edited_whole, incident_forms
-from contfric.continuation.outcomes import Outcome
+from contfric.continuation.outcomes import Successor
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.unit import Form, Unit
 from contfric.errors import NotationError
@@ -168,7 +168,7 @@ def _reason(unit: Unit, forms: tuple[Form, ...], sequence: tuple[int, ...]) -> s
     return text if turns == 1 else f"over {turns} of its periods: {text}"
 
 
-def edited_orbit(orbit: Orbit, outcomes: list[Outcome]) -> tuple[Orbit, FloatArray | None]:
+def edited_orbit(orbit: Orbit, outcomes: list[Successor]) -> tuple[Orbit, FloatArray | None]:
     """Return the same solution as an orbit of the edited itinerary, on its half if it is symmetric.
 
     And how its joints move away from the event, shape (N, 1 + n), where it is singular there.

@@ -134,7 +134,7 @@ class EndReason(str, Enum):
 ACCURACY = 1e-8
 
 
-class Verdict(str, Enum):
+class Decision(str, Enum):
     """What became of a candidate."""
 
     ACCEPTED = "accepted"
@@ -155,7 +155,7 @@ class Proposal:
     """
 
     reason: str
-    verdict: Verdict
+    verdict: Decision
     branch: int | None = None
     why: str = ""
 

@@ -26,7 +26,12 @@ import numpy as np
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.locations import TANGENTIAL, locations_of, normal_location
-from contfric.continuation.outcomes import NO_LENGTH_AT_TOUCH, Outcome, RestsForEver, outcome_at
+from contfric.continuation.outcomes import (
+    NO_LENGTH_AT_TOUCH,
+    RestsForEver,
+    Successor,
+    outcome_at,
+)
 from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
@@ -263,7 +268,7 @@ def _vanished(orbit: Orbit) -> Iterator[EventFunction]:
 
 
 def edited_whole(
-    orbit: Orbit, outcomes: list[Outcome], away: FloatArray | None = None
+    orbit: Orbit, outcomes: list[Successor], away: FloatArray | None = None
 ) -> tuple[Orbit, FloatArray]:
     """Return the same motion as an orbit of the edited itinerary, and how its joints move away, shape (N,).
 

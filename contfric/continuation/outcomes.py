@@ -79,8 +79,8 @@ class RestsForEver(NotationError):
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """One outcome at one location.
+class Successor:
+    """What follows at one location: one of the outcomes there.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Outcome:
     away: Mapping[Origin, float] = field(default_factory=dict)
 
 
-def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
+def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
     """Return what can follow at one location of a whole orbit.
 
     Raises
@@ -124,14 +124,14 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
         raise NotationError(f"the wall {location.surface} is met {where}")
     if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
-        return Outcome(edit, joints, reason, away)
+        return Successor(edit, joints, reason, away)
     if kind is Kind.CS:
         i, surface = location.segment, location.surface
         edit, joints = (
             swap_edit(orbit.itinerary, {i: surface}, orbit.model),
             {(i, 0): orbit.ends[i]},
         )
-        return Outcome(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
+        return Successor(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
     if kind is Kind.SS:
         return _stop_on_surface(orbit, location)
     if orbit.model.reset_at(mode, location.surface) is not None:
@@ -146,22 +146,22 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Outcome:
     return _stops_tangentially(orbit, location) if ends else _rest_touched(orbit, location)
 
 
-def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Outcome:
+def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Successor:
     """SS: the stop is on a surface, and the load falls."""
     model, itinerary, i = orbit.model, orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
     if slides.goes_nowhere(orbit, j):
-        return Outcome(*slides.left_out(orbit, j))
+        return Successor(*slides.left_out(orbit, j))
     rest = rest_mode(orbit, i, itinerary[i][1])
     check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
     if model.lies_on(itinerary[j][0], itinerary[i][1]):
         return _stick_becomes_hold(orbit, j, hold_at(location.surface), location.surface)
     edit = insert(i, (rest, hold_at(location.surface)))
     reason = f"hold at stop {i + 1}, on {location.surface}, instead of the reversal"
-    return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
+    return Successor(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
-def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
+def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Successor:
     """GS: a stop without acceleration."""
     itinerary, i = orbit.itinerary, location.segment
     j = (i + 1) % len(itinerary)
@@ -169,30 +169,30 @@ def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
     if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
         raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
     if slides.only_touches(orbit, j):
-        return Outcome(*slides.touch_alone(orbit, j))
+        return Successor(*slides.touch_alone(orbit, j))
     check_inside(orbit, itinerary[j][0], orbit.ends[i])
     return _stick_becomes_hold(orbit, j, TOUCH, None)
 
 
-def _released_tangentially(orbit: Orbit, location: EventFunction) -> Outcome:
+def _released_tangentially(orbit: Orbit, location: EventFunction) -> Successor:
     """AS: a stick is released where its load just reaches the limit."""
     i, (mode, exit_) = location.segment, orbit.itinerary[location.segment]
     if slides.only_touches(orbit, i + 1):
-        return Outcome(*slides.touch_alone(orbit, (i + 1) % len(orbit.itinerary)))
+        return Successor(*slides.touch_alone(orbit, (i + 1) % len(orbit.itinerary)))
     check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
     edit = insert(i, (mode, TOUCH))
     reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
-    return Outcome(edit, {(i, 0): orbit.ends[i]}, reason)
+    return Successor(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
-def _pinned_at_stop(orbit: Orbit, location: EventFunction) -> Outcome:
+def _pinned_at_stop(orbit: Orbit, location: EventFunction) -> Successor:
     """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
     i, surface = location.segment, orbit.itinerary[location.segment][1]
     edit = Edit(frozenset({i}), {(i + 1) % len(orbit.itinerary): hold_at(surface)})
-    return Outcome(edit, {}, f"stick {i + 1} vanishes: the hold after it starts at the stop")
+    return Successor(edit, {}, f"stick {i + 1} vanishes: the hold after it starts at the stop")
 
 
-def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
+def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
     """AS: inside of a stick its load touches the limit."""
     model, itinerary, i = orbit.model, orbit.itinerary, location.segment
     mode, exit_ = itinerary[i]
@@ -200,7 +200,7 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
     touch = touch_of(orbit, i, location.surface)
     departs = _released(model, mode, location.surface)
     if model.filippov:
-        return Outcome(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
+        return Successor(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
     check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
     still = first_zero_acceleration(orbit, i, touch[0], departs)
@@ -208,29 +208,29 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Outcome:
         left = (departs, left_surface(model, mode, departs))
         edit = split(i, location.surface, (mode, TOUCH), left, (mode, exit_))
         away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
-        return Outcome(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
+        return Successor(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
     if is_hold(itinerary[j][1]):  # the stick ended tangentially: its hold begins earlier
         edit = Edit(renamed={i: location.surface, j: TOUCH})
-        return Outcome(edit, {(j, -1): touch}, reason)
-    return Outcome(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+        return Successor(edit, {(j, -1): touch}, reason)
+    return Successor(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
 
 
-def _rest_touched(orbit: Orbit, location: EventFunction) -> Outcome:
+def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:
     """GS: inside of a slide the velocity touches zero."""
     i = location.segment
     mode, exit_ = orbit.itinerary[i]
     touch = touch_of(orbit, i, location.surface)
     rest = rest_mode(orbit, i, location.surface)
     if orbit.model.filippov:
-        return Outcome(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
+        return Successor(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
     check_inside(orbit, rest, touch)
     edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))
     reason = f"hold at the touch of rest in slide {i + 1}"
-    return Outcome(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
+    return Successor(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
 
 
-def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Outcome:
+def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Successor:
     """Return the outcome in which a stick that begins at the event is a hold."""
     model, itinerary = orbit.model, orbit.itinerary
     mode, exit_ = itinerary[j]
@@ -242,12 +242,12 @@ def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) ->
         left = (departs, left_surface(model, mode, departs))
         edit = split(j, hold, left, (mode, exit_))
         away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
-        return Outcome(edit, {(j, 0): still, (j, 1): still}, reason, away)
+        return Successor(edit, {(j, 0): still, (j, 1): still}, reason, away)
     _same_way(orbit, mode, exit_, departs)
     edit = split(j, hold)
     if is_hold(itinerary[behind][1]):  # the stick ended tangentially: one hold replaces both
         edit |= drop(behind)
-    return Outcome(edit, {}, reason)
+    return Successor(edit, {}, reason)
 
 
 def _released(model: Model, mode: str, surface: str) -> str:
@@ -264,7 +264,7 @@ def _released(model: Model, mode: str, surface: str) -> str:
     return found
 
 
-def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
+def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     """Return what follows where a hold comes to an end of its freedom."""
     h, itinerary = location.segment, orbit.itinerary
     before, behind = h - 1, (h + 1) % len(itinerary)
@@ -274,11 +274,11 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
     if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length * time_unit(orbit):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
-            return Outcome(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
-        return Outcome(drop(h), {}, reason)
+            return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
+        return Successor(drop(h), {}, reason)
     if location.margin is Margin.JOINT:
         reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
-        return Outcome(_as_stick(orbit, h, location.surface, after_rest, ()), {}, reason)
+        return Successor(_as_stick(orbit, h, location.surface, after_rest, ()), {}, reason)
     if location.margin is Margin.EXIT:
         return _never_left(orbit, h, after_rest)
     if location.margin is Margin.INTERIOR:
@@ -293,7 +293,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Outcome:
     reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
     edit = insert(h, left, (itinerary[h][0], TOUCH))
     away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
-    return Outcome(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
+    return Successor(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
 
 
 def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[int, ...]) -> Edit:
@@ -303,7 +303,7 @@ def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[
     return Edit(frozenset(gone), {h: surface})
 
 
-def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
+def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Successor:
     """Return the outcome where the slide after a hold has vanished: the rest after it takes over."""
     itinerary, count = orbit.itinerary, len(orbit.itinerary)
     slide, rest = (h + 1) % count, (h + 2) % count
@@ -313,11 +313,11 @@ def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Outcome:
     if rest in (h, (h - 1) % count):
         raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
     if itinerary[rest][1] == TOUCH:  # two holds become one
-        return Outcome(drop(slide, rest), {}, reason)
-    return Outcome(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
+        return Successor(drop(slide, rest), {}, reason)
+    return Successor(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
 
 
-def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Outcome:
+def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Successor:
     """Return the outcome where a hold touches its limit: a stick to there, and the hold after it."""
     h = location.segment
     touch = touch_of(orbit, h, location.surface)
@@ -326,9 +326,9 @@ def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Outco
         if touches_again(orbit, h, location.surface, float(orbit.cycle[h, 0])):
             raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
         edit = Edit(renamed={(h - 1) % len(orbit.itinerary): location.surface, h: TOUCH})
-        return Outcome(edit, {(h, -1): touch}, reason)
+        return Successor(edit, {(h, -1): touch}, reason)
     edit = split(h, location.surface, (orbit.itinerary[h][0], TOUCH))
-    return Outcome(edit, {(h, 0): touch}, reason)
+    return Successor(edit, {(h, 0): touch}, reason)
 
 
 def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
@@ -338,7 +338,7 @@ def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
         raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
 
 
-def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
+def _grazing_impact(orbit: Orbit, location: EventFunction) -> Successor:
     """GS at a reset: an impact of speed zero comes in, or goes."""
     itinerary, i = orbit.itinerary, location.segment
     mode, exit_ = itinerary[i]
@@ -349,10 +349,10 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Outcome:
     if location.margin is Margin.INTERIOR:
         edit = split(i, location.surface, (mode, exit_))
         reason = f"impact at the touch of {location.surface} in segment {i + 1}"
-        return Outcome(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
+        return Successor(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
     behind = (i + 1) % len(itinerary)
     whole = orbit.model.whole_mode
     if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
     reason = f"no impact on {location.surface} after segment {i + 1}"
-    return Outcome(*slides.runs_on(orbit, i, behind), reason)
+    return Successor(*slides.runs_on(orbit, i, behind), reason)

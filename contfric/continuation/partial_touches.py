@@ -18,7 +18,7 @@ from contfric.continuation.candidates import Candidate, along_motion
 from contfric.continuation.events import Bifurcation
 from contfric.continuation.incident import edited_whole, vanishing
 from contfric.continuation.leaving_touch import Leaving, leaving
-from contfric.continuation.outcomes import Outcome, outcome_at
+from contfric.continuation.outcomes import Successor, outcome_at
 from contfric.continuation.touching import coming_back, crossed_at, is_crossed, speeds_of_crossing
 from contfric.continuation.zero_acceleration import touch_of
 from contfric.errors import NotationError
@@ -94,7 +94,7 @@ def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str, way: Leaving | 
         else:
             dropped |= {k, (k + 1) % n}
     try:
-        edited, moves = edited_whole(orbit, [Outcome(Edit(frozenset(dropped)), {}, reason)], away)
+        edited, moves = edited_whole(orbit, [Successor(Edit(frozenset(dropped)), {}, reason)], away)
     except NotationError as error:
         return Candidate(reason, None, str(error))
     itineraries = frozenset({edited.itinerary})

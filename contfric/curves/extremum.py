@@ -27,7 +27,7 @@ from contfric.continuation.points import MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Defects, Held
-from contfric.curves.quantity_trace import both_sides
+from contfric.curves.quantity_trace import both_sides, check_orbit
 from contfric.curves.ranges import Ranges, ranges_of
 from contfric.curves.trace import Progress, largest_step
 from contfric.errors import (
@@ -233,12 +233,7 @@ def _start(
     orbit: Orbit, quantity: Quantity, box: Ranges, progress: Progress | None
 ) -> tuple[Stationary, Point]:
     """Return the problem and its first point: near the orbit, else by fewer parameters first."""
-    if not orbit.converged:
-        raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    here = np.array([orbit.params[name] for name in box.names])
-    if not box.contains(here):
-        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
-        raise ParameterError(f"the orbit is at {where}, outside of the ranges")
+    check_orbit(orbit, box)
     near = _nearer(orbit, quantity, box, progress)
     held = Stationary(canonical(near).as_half(), quantity, 0.0, box)
     first = held.first()

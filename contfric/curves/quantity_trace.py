@@ -19,7 +19,7 @@ from contfric.curves.locating import locate_zero
 from contfric.curves.points import end_of_march, march_on
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
-from contfric.curves.ranges import PlaneRanges, box_of
+from contfric.curves.ranges import PlaneRanges, Ranges, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import Progress, largest_step
 from contfric.errors import (
@@ -152,16 +152,29 @@ def trace_both(
     return points, arc - arc[0], (behind.end, ahead.end)
 
 
-def _start(
-    orbit: Orbit, quantity: Quantity, value: float, box: PlaneRanges, progress: Progress | None
-) -> Orbit:
-    """Return an orbit on the curve: the given one, or one of a branch through it."""
+def check_orbit(orbit: Orbit, box: Ranges) -> None:
+    """Check that a curve may begin at an orbit.
+
+    Raises
+    ------
+    ConvergenceError
+        If it is not solved.
+    ParameterError
+        If it is outside of the ranges.
+    """
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     here = np.array([orbit.params[name] for name in box.names])
     if not box.contains(here):
         where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
         raise ParameterError(f"the orbit is at {where}, outside of the ranges")
+
+
+def _start(
+    orbit: Orbit, quantity: Quantity, value: float, box: PlaneRanges, progress: Progress | None
+) -> Orbit:
+    """Return an orbit on the curve: the given one, or one of a branch through it."""
+    check_orbit(orbit, box)
     miss = differentiated(quantity, orbit, None).value - value
     if abs(miss) < _AT_VALUE * (1.0 + abs(value)):
         return canonical(orbit).as_half()

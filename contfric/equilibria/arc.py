@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.equilibria.regions import Region
+from contfric.equilibria.regions import ModeRegion
 from contfric.models.definition import FloatArray
 
 #: Newton's method in the normal plane: quadratic, from a predictor that is near.
@@ -52,7 +52,7 @@ class Arc:
     width : that of the parameter
     """
 
-    region: Region
+    region: ModeRegion
     vector: FloatArray
     active: int
     scale: FloatArray

@@ -25,7 +25,7 @@ from enum import Enum
 import numpy as np
 
 from contfric.equilibria.arc import Arc, CurvePoint
-from contfric.equilibria.regions import Region, regions_of
+from contfric.equilibria.regions import ModeRegion, regions_of
 from contfric.models.definition import FloatArray
 
 #: A field vanishes: relative to what its rates are at a natural distance.
@@ -53,7 +53,7 @@ class Partner:
     """
 
     unfolding: Unfolding
-    region: Region | None = None
+    region: ModeRegion | None = None
     place: CurvePoint | None = None
     product: float = float("nan")
 
@@ -79,7 +79,7 @@ def partner_of(arc: Arc, place: CurvePoint, surface: str) -> Partner:
     return Partner(unfolding, region, inwards, product)
 
 
-def _rests(region: Region, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
+def _rests(region: ModeRegion, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
     """Tell whether the field of a region vanishes at a state in its closure."""
     rates = region.fields.value(y, p)
     size = np.abs(region.fields.jacobian(y, p)) @ arc.scale + 1e-300
@@ -114,7 +114,9 @@ def height_rate(arc: Arc, place: CurvePoint, surface: str) -> float:
     return float((heights[0] - heights[1]) / (2.0 * short))
 
 
-def product_of(one: Region, other: Region, surface: str, y: FloatArray, p: FloatArray) -> float:
+def product_of(
+    one: ModeRegion, other: ModeRegion, surface: str, y: FloatArray, p: FloatArray
+) -> float:
     """Return the number whose sign tells persistence from a non-smooth fold; nan where it has no meaning.
 
     ``det N2 / det N1`` of two modes that move, ``-C N^{-1} E`` of one that moves and one that slides:
@@ -137,7 +139,9 @@ def product_of(one: Region, other: Region, surface: str, y: FloatArray, p: Float
     return float(-slope @ np.linalg.solve(moving.fields.jacobian(y, p), jump))
 
 
-def _beyond(moving: Region, held: str, side: int, y: FloatArray, p: FloatArray) -> Region | None:
+def _beyond(
+    moving: ModeRegion, held: str, side: int, y: FloatArray, p: FloatArray
+) -> ModeRegion | None:
     """Return the region on the other side of a surface, at a state on it."""
     for region in regions_of(moving.model):
         if region.on or region is moving or region.domain_of(y, p)[1]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
-from contfric.equilibria.regions import Region
+from contfric.equilibria.regions import ModeRegion
 from contfric.equilibria.result import Equilibrium, Location
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import FloatArray, Model
@@ -46,7 +46,7 @@ class EquilibriumBranch(Tabled):
     states : ndarray, shape (k, n)
     eigenvalues : ndarray, shape (k, n)
         nan behind those within the surfaces of a mode.
-    regions : tuple of Region
+    regions : tuple of ModeRegion
         Region of each point.
     admissible : ndarray of bool, shape (k,)
     events : tuple of EquilibriumEvent
@@ -68,7 +68,7 @@ class EquilibriumBranch(Tabled):
     values: FloatArray
     states: FloatArray
     eigenvalues: NDArray[np.complex128]
-    regions: tuple[Region, ...]
+    regions: tuple[ModeRegion, ...]
     admissible: NDArray[np.bool_]
     events: tuple[EquilibriumEvent, ...]
     ends: tuple[BranchEnd, BranchEnd]

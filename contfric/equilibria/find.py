@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from contfric.equilibria.newton import Zeros
-from contfric.equilibria.regions import Region, check_no_excitation, regions_of, scale_of
+from contfric.equilibria.regions import ModeRegion, check_no_excitation, regions_of, scale_of
 from contfric.equilibria.result import Equilibria, Equilibrium, EquilibriumSet, Location
 from contfric.equilibria.sets import followed, holds_state, set_of_plane, sets_of_line
 from contfric.errors import whole_number
@@ -127,7 +127,7 @@ def _unwound(model: Model, y: FloatArray) -> FloatArray:
     return found
 
 
-def equilibrium_at(region: Region, y: FloatArray, p: FloatArray) -> Equilibrium:
+def equilibrium_at(region: ModeRegion, y: FloatArray, p: FloatArray) -> Equilibrium:
     """Return a zero of a region's field as a result: where it lies, and its eigenvalues."""
     _, wrong = region.domain_of(y, p)
     location = Location.VIRTUAL if wrong else Location.ADMISSIBLE

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.equilibria.regions import Region
+from contfric.equilibria.regions import ModeRegion
 from contfric.equilibria.result import ComplexArray
 from contfric.models.definition import FloatArray
 
@@ -68,7 +68,7 @@ def is_oscillating(eigenvalues: ComplexArray, k: int) -> bool:
     return bool(abs(eigenvalues[k].imag) > _REAL * size)
 
 
-def centre_of(region: Region, y: FloatArray, p: FloatArray, active: int) -> Centre:
+def centre_of(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> Centre:
     """Return the centre subspace and the normal form of a Hopf point."""
     fields, pull = region.fields, 1.0
     a = fields.jacobian(y, p, pull)

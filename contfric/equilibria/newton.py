@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.equilibria.regions import Region
+from contfric.equilibria.regions import ModeRegion
 from contfric.models.definition import FloatArray
 
 #: Newton's method converges within about ten steps, or wanders.
@@ -33,7 +33,7 @@ class Zeros:
     scale : natural size of each state, shape (n,)
     """
 
-    region: Region
+    region: ModeRegion
     p: FloatArray
     scale: FloatArray
 

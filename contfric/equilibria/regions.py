@@ -48,7 +48,7 @@ class Heights:
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class ModeRegion:
     """A mode (one side of its kinks), its field, and where it holds.
 
     Attributes
@@ -144,7 +144,7 @@ def scale_of(model: Model, p: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=32)
-def regions_of(model: Model) -> tuple[Region, ...]:
+def regions_of(model: Model) -> tuple[ModeRegion, ...]:
     """Return the regions of a model, in the order of its modes.
 
     Raises
@@ -195,7 +195,7 @@ def regions_of(model: Model) -> tuple[Region, ...]:
             all(not f.diff(s).free_symbols & set(formulas.y) for f in parts for s in formulas.y),
         )
         kinks = dict(zip(description.kinks, bits, strict=True))
-        found.append(Region(model, mode.name, kinks, on, own, heights))
+        found.append(ModeRegion(model, mode.name, kinks, on, own, heights))
     return tuple(found)
 
 

@@ -18,7 +18,7 @@ from contfric.models.definition import FloatArray, Model
 if TYPE_CHECKING:
     import pandas as pd
 
-    from contfric.equilibria.regions import Region
+    from contfric.equilibria.regions import ModeRegion
 
 ComplexArray = NDArray[np.complex128]
 #: A real part smaller than this share of the largest eigenvalue is zero to rounding: the root of rounding, as
@@ -38,7 +38,7 @@ class Location(str, Enum):
 class Rest(Shown):
     """A state at which one mode rests: what an equilibrium and a set of them have in common."""
 
-    region: Region
+    region: ModeRegion
     vector: FloatArray
     state: FloatArray
 

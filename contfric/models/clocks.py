@@ -22,6 +22,7 @@ from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.entries import EntryError, mapping_in
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope
+from contfric.models.rewriting import OF_MODES, SHARED, rewritten
 from contfric.models.slow_time import check_time
 
 #: What the clock and its surface are called, and the function that stands for it.
@@ -30,9 +31,6 @@ CLOCK, TICK, MOD = "clock", "tick", "mod"
 _SAME = 1e-12
 #: Shares by which parameters are moved: two periods that are equal at the defaults may be so by accident.
 _MOVED = (0.0, 0.137)
-
-#: Parts of a model that hold expressions, how many keys down.
-_PARTS = {"define": 1, "observables": 1, "field": 1, "resets": 2}
 
 
 def is_clock(state: str) -> bool:
@@ -61,20 +59,12 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
     define = {str(name): str(text) for name, text in mapping_in(data, "define").items()}
     every = value_at_defaults(str(period), data)
     check_time(timed, define, values, every, _is_mod)
-    found = {
-        key: _rewritten(value, (key,), depth, reader)
-        for key, value in data.items()
-        if (depth := _PARTS.get(key, 0)) >= 0
-    }
-    own_fields = {
-        name: _own_field(mode, name, reader) for name, mode in mapping_in(data, "modes").items()
-    }
+    found = rewritten(rewritten(data, SHARED, reader.read), OF_MODES, reader.read)
     ahead = reader.ahead
     rates = {CLOCK: 1, **dict.fromkeys(ahead.values(), 1)}
     ticks = {TICK: CLOCK, **{clock.replace(CLOCK, TICK): clock for clock in ahead.values()}}
     found["modes"] = {
-        name: _mode(mode, own_fields[name], rates, ticks)
-        for name, mode in mapping_in(data, "modes").items()
+        name: _mode(mode, rates, ticks) for name, mode in mapping_in(found, "modes").items()
     }
     if "field" in data:
         found["field"] = {**found["field"], **rates}
@@ -100,22 +90,13 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
 
 def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
     """Return all expressions of time with their addresses."""
-    parts = [(key, data.get(key), depth) for key, depth in _PARTS.items()]
     found: list[tuple[Address, str]] = []
-    for key, value, depth in parts:
-        found += _texts(value, (key,), depth)
-    for name, mode in mapping_in(data, "modes").items():
-        if isinstance(mode, Mapping):
-            found += _texts(mode.get("field"), ("modes", name, "field"), 1)
+
+    def note(text: Any, address: Address) -> Any:
+        found.extend([(address, text)] if isinstance(text, str) else [])
+
+    rewritten(data, (*SHARED, *OF_MODES), note)
     return found
-
-
-def _texts(value: object, address: Address, depth: int) -> list[tuple[Address, str]]:
-    if depth == 0:
-        return [(address, value)] if isinstance(value, str) else []
-    if not isinstance(value, Mapping):
-        return []
-    return [pair for key, v in value.items() for pair in _texts(v, (*address, str(key)), depth - 1)]
 
 
 def _tree(text: str) -> ast.Expression | None:
@@ -163,9 +144,9 @@ class _Reader(ast.NodeTransformer):
             if (tree := _tree(str(text))) is not None
         }
 
-    def read(self, text: str, address: Address) -> str:
-        """Return an expression with the clock in it."""
-        tree, self.address = _tree(text), address
+    def read(self, text: Any, address: Address) -> Any:
+        """Return an expression with the clock in it; a number as it is."""
+        tree, self.address = _tree(text) if isinstance(text, str) else None, address
         return text if tree is None else ast.unparse(self.visit(tree))
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -268,31 +249,12 @@ def _is_time(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and node.id == TIME
 
 
-def _rewritten(value: Any, address: Address, depth: int, reader: _Reader) -> Any:
-    if depth and isinstance(value, Mapping):
-        return {k: _rewritten(v, (*address, str(k)), depth - 1, reader) for k, v in value.items()}
-    named = address[:1] == ("resets",) and address[-1] in ("to", "from")
-    at_end = depth == 0 and address[0] in _PARTS
-    return reader.read(value, address) if at_end and isinstance(value, str) and not named else value
-
-
-def _own_field(mode: Any, name: str, reader: _Reader) -> Any:
-    """Return the field of a mode with the clocks in it; None if it has none of its own."""
-    if not isinstance(mode, Mapping) or not isinstance(mode.get("field"), Mapping):
-        return None
-    return {
-        state: reader.read(text, ("modes", name, "field", str(state)))
-        if isinstance(text, str)
-        else text
-        for state, text in mode["field"].items()
-    }
-
-
-def _mode(mode: Any, field: Any, rates: Mapping[str, int], ticks: Iterable[str]) -> Any:
+def _mode(mode: Any, rates: Mapping[str, int], ticks: Iterable[str]) -> Any:
     if not isinstance(mode, Mapping):
         return mode
     found = {**mode, "in": {**mapping_in(mode, "in"), **dict.fromkeys(ticks, "-")}}
-    return found if field is None else {**found, "field": {**field, **rates}}
+    field = mode.get("field")
+    return {**found, "field": {**field, **rates}} if isinstance(field, Mapping) else found
 
 
 def _symmetry(data: Mapping[str, Any]) -> Any:

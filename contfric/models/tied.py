@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ParameterError, did_you_mean, shown
@@ -158,35 +158,12 @@ def _named(name: str, ties: Mapping[str, str]) -> str:
 
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:
     """Return a model's data with expressions in the place of parameters."""
+    from contfric.models.rewriting import OF_MODES, OTHERS, SHARED, rewritten
+
     put = Substitution(ties)
-    found = dict(data)
+    found = rewritten(data, (*SHARED, *OF_MODES, *OTHERS), lambda text, _: put.text(text))
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
     found["constraints"] = {put.condition(text): why for text, why in data["constraints"].items()}
-    for key in ("define", "observables"):
-        found[key] = put.each(data[key])
-    found["spread"] = {
-        state: [put.text(end) for end in width] if isinstance(width, list) else put.text(width)
-        for state, width in data["spread"].items()
-    }
-    if "quantities" in data:
-        found["quantities"] = put.each(data["quantities"])
-    if "forces" in data:
-        found["forces"] = {
-            name: {**entry, "texts": put.each(entry["texts"])}
-            for name, entry in data["forces"].items()
-        }
-    if "period" in data:
-        found["period"] = put.text(data["period"])
-    if "field" in data:
-        found["field"] = put.each(data["field"])
-    found["surfaces"] = {name: put.part(entry, "level") for name, entry in data["surfaces"].items()}
-    found["modes"] = {
-        name: {**entry, "field": put.each(entry["field"])} if "field" in entry else entry
-        for name, entry in data["modes"].items()
-    }
-    found["resets"] = {
-        name: put.each(texts, skip=("to", "from")) for name, texts in data["resets"].items()
-    }
     return found
 
 
@@ -214,11 +191,3 @@ class Substitution(ast.NodeTransformer):
         """Return an inequality with the ties put in, as it stood if none is in it."""
         names = {word for word in self.trees if re.search(rf"\b{re.escape(word)}\b", text)}
         return self.text(text) if names else text
-
-    def part(self, entry: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-        """Return an entry with the ties put into one of its expressions, if it has that."""
-        return {**entry, key: self.text(entry[key])} if key in entry else entry
-
-    def each(self, texts: Mapping[str, str], skip: Iterable[str] = ()) -> dict[str, str]:
-        """Return a mapping of expressions with the ties put in."""
-        return {k: v if k in skip else self.text(v) for k, v in texts.items()}

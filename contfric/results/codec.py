@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from contfric.continuation.events import Bifurcation, End
 from contfric.curves.special import SpecialPoint
-from contfric.equilibria.regions import Region, regions_of
+from contfric.equilibria.regions import ModeRegion, regions_of
 from contfric.errors import ResultFileError
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
@@ -30,7 +30,7 @@ Arrays = dict[str, NDArray[Any]]
 _LARGE = 4096
 #: What is one object again afterwards, if it was one. Others are written wherever they stand: whether two
 #: parts share an array depends on how they were found, and the same result is the same file.
-_SHARED = (Model, System, Orbit, Bifurcation, End, SpecialPoint, Region)
+_SHARED = (Model, System, Orbit, Bifurcation, End, SpecialPoint, ModeRegion)
 #: What a curve was computed from is not kept.
 _LEFT_OUT = {("CurvePart", "problem")}
 
@@ -101,11 +101,11 @@ def _default(field: Field[Any]) -> Any:
 
 
 # Regions hold compiled formulas, and modes are numbered as a solution has visited them.
-def _region(model: Model, number: int) -> Region:
+def _region(model: Model, number: int) -> ModeRegion:
     return regions_of(model)[number]
 
 
-made_of(Region, lambda r: (r.model, regions_of(r.model).index(r)), _region)
+made_of(ModeRegion, lambda r: (r.model, regions_of(r.model).index(r)), _region)
 
 
 def _named(found: Trajectory) -> tuple[Any, ...]:

@@ -17,7 +17,7 @@ STEEP, MOST_PIECES, MOST_HALVINGS = 0.02, 20_000, 90  # least share of a paramet
 MET = {"CS": "1F0", "SS": "1F0", "GS": "1v1", "T": "1F1", "AS": "0F1"}  # slides, meets, in windows
 
 
-class Box:
+class Link:
     """The orbits between two knots; or, without a second one, an orbit next to a point."""
 
     def __init__(self, data: Any, a: list[arb], b: Any = None, border: Any = None) -> None:
@@ -78,7 +78,7 @@ class Box:
         """Return a coefficient of F along the line."""
         return column(part(v, order) for v in [*Scene.equations(*self.orbits(s, self.along))[0], 0])
 
-    def holds(self, point: Box) -> bool:
+    def holds(self, point: Link) -> bool:
         """Tell whether the orbit next to a point is one of the box."""
         scene, z = point.orbits(0)
         off = column([*z, scene.value]) - self.middle
@@ -86,7 +86,7 @@ class Box:
         left = self.radii - size(off - s * self.along)
         return abs(s) < HALF and all(margin > 0 for margin in left.entries())
 
-    def events(self, first: Box, last: Box) -> list[str]:
+    def events(self, first: Link, last: Link) -> list[str]:
         """Return which multipliers pass the circle between two orbits, once each: their rates have a sign."""
         found, (scene, z) = list[str](), self.moving()
         trace, det, along = scene.multipliers(z)
@@ -160,7 +160,7 @@ def _inside(orbit: Any, i: int, name: str, sign: int, order: int, ends: bool, me
             waiting += [(level + 1, 2 * index), (level + 1, 2 * index + 1)]
 
 
-def met_in(box: Box, a: Box, b: Box, kind: str, spots: list[Any]) -> dict[tuple[int, str], arb]:
+def met_in(box: Link, a: Link, b: Link, kind: str, spots: list[Any]) -> dict[tuple[int, str], arb]:
     """Return what is met at an event between two orbits, and when: all of it falls, and some passes 0."""
     (scene, z), moving, met, passed = box.orbits(INSIDE), box.moving(), {}, False
     for i, what, *window in spots:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from flint import acb, arb, ctx
 
-from contfric.verify.curve import INSIDE, Box, check_admissible, met_in
+from contfric.verify.curve import INSIDE, Link, check_admissible, met_in
 from contfric.verify.motion import Refused, Scene, Undecided, ball, see
 
 FORMAT, CHECKED_MODELS, BITS = 2, ("coulomb",), (106, 212, 424, 848)  # until all is decided
@@ -66,16 +66,16 @@ def _knot(data: Any, row: Any) -> list[arb]:
     return [*(c if k % 2 else c * omega for k, c in enumerate(joints)), value]
 
 
-def orbits_at(data: Any, known: Any = ()) -> list[Box]:
+def orbits_at(data: Any, known: Any = ()) -> list[Link]:
     """Return the orbits next to the knots of a curve, the first ones if known; near folds normal to it."""
     knots = [_knot(data, row) for row in data["knots"]]
     pairs = list(zip(knots, [*knots[1:2], *knots], strict=False))[len(known) :]
-    return [*known, *(Box(data, at, None, Box(data, by, at).border).proved() for at, by in pairs)]
+    return [*known, *(Link(data, at, None, Link(data, by, at).border).proved() for at, by in pairs)]
 
 
-def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], Box]:
+def events_between(data: Any, a: Link, b: Link, end: Any) -> tuple[list[str], Link]:
     """Return the events on the one curve of admissible orbits from a to b, or to an end; and its box."""
-    box = Box(data, a.middle.entries(), b.middle.entries()).proved()
+    box = Link(data, a.middle.entries(), b.middle.entries()).proved()
     see(box.holds(a) and box.holds(b), "one curve from knot to knot", False)
     met, (scene, z) = met_in(box, a, b, *end) if end else {}, box.orbits(INSIDE)
     check_admissible(scene, z, met, bool(end) and end[0] == "CS")
@@ -83,7 +83,7 @@ def events_between(data: Any, a: Box, b: Box, end: Any) -> tuple[list[str], Box]
 
 
 def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
-    points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Box]()
+    points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Link]()
     stop, ends = len(points) - 2, [points[k].orbits(0) for k in (0, -1)]
     see(stop >= bool(left and right) and "T" not in f"{left}{right}", "a tube may have such ends")
     for k, (a, b) in enumerate(pairwise(points)):
@@ -114,13 +114,13 @@ def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"]
     see({"exists"} <= set(claims) <= set(CLAIMS), "its statements are those of an orbit")
     printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
-    scene, z = Box(data, [*printed, ball(s)]).proved().orbits(0)
+    scene, z = Link(data, [*printed, ball(s)]).proved().orbits(0)
     for value, near, r in zip(z, printed, radius, strict=True):
         see(r - abs(value - near), "it lies in the box around the printed joints")
     for k, text in enumerate(data["enclosure"]):
         see(ball(text).contains(z[k] if k % 2 else z[k] / scene.omega), "its ball holds it", False)
     if "unique" in claims:
-        Box(data, [*printed, ball(s)]).proved([*radius, arb(0)])
+        Link(data, [*printed, ball(s)]).proved([*radius, arb(0)])
     if "admissible" in claims:
         check_admissible(scene, z)
     trace, det, jury = scene.multipliers(z)

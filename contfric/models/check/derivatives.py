@@ -23,7 +23,6 @@ from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import FloatArray, Model
 from contfric.models.describe import from_text
-from contfric.models.evaluate import Evaluator
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5
@@ -35,6 +34,8 @@ _SAME = 1e-9
 _COARSE, _COARSE_STEP = 1e-5, 6e-6
 
 Jacobian = tuple[FloatArray, FloatArray]
+Compiled = Callable[[FloatArray], Jacobian]
+Formula = Callable[[list[Any]], list[Any]]
 #: Returns the points at which the functions of a mode (None: of all states) are compared.
 Points = Callable[[str | None], list[FloatArray]]
 #: Fields in many digits that are kept: those at the points of the differences of one mode.
@@ -50,8 +51,8 @@ class Case:
     """
 
     what: str
-    compiled: Callable[[FloatArray], Jacobian]
-    formula: Callable[[list[Any]], list[Any]]
+    compiled: Compiled
+    formula: Formula
     mode: str | None = None
     step: Any = _INNER
 
@@ -62,7 +63,7 @@ def check_derivatives(report: ModelReport, probe: Probe) -> None:
     near = Probe(model, _nearby(model, probe))
     points = cache(lambda mode: list(_points(near, mode)))  # looked for among many states
     _rates_along(report, near, points)
-    for case in _described(near) if model.definition else _closed(near):
+    for case in _cases(near):
         has_value = [
             _compare(report, model, case, point, bool(model.definition))
             for point in points(case.mode)
@@ -166,34 +167,36 @@ def _shown(names: list[str], point: FloatArray) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in zip(names, point, strict=True))
 
 
-# -------------------------------------------------------------------- models with a description
+# --------------------------------------------------------------------------------------- cases
 
 
-def _described(probe: Probe) -> list[Case]:
-    model, description = probe.model, from_text(probe.model.definition)
-    exact, field = digits(description), field_of(model.definition)
-    split = _Split(model)
-    fields = lru_cache(maxsize=_KEPT)(_Fields(split, exact))
-    found = [_observable(split, exact, o.name, c) for c, o in enumerate(model.observables)]
-    for m, mode in enumerate(model.modes):
-        found.append(_field(split, exact, field, mode.name, m))
-        found += [
-            _rate(split, exact, fields, (mode.name, m), (o.name, c))
-            for c, o in enumerate(model.observables)
-        ]
-    found += [
-        _reset(split, exact, description.resets[s.name], s.name, k)
-        for k, s in enumerate(model.surfaces)
-        if s.name in description.resets
+def _cases(probe: Probe) -> list[Case]:
+    """Return the compiled functions of a model, each with its formula where the model has any."""
+    model = probe.model
+    flow, ends = model.flow, model.surfaces
+    cases = _Described(model) if model.definition else _Cases(model)
+    found = [
+        Case(f"observable '{o.name}'", cases.scalar(flow.observe, c), cases.observable(o.name))
+        for c, o in enumerate(model.observables)
     ]
-    return [*found, *_levels(split, exact, description.period)]
+    for m, mode in enumerate(model.modes):
+        found += cases.field(m, mode.name)
+        for c, o in enumerate(model.observables):
+            what, rate = f"rate of '{o.name}' in mode '{mode.name}'", cases.scalar(flow.rate, m, c)
+            found.append(Case(what, rate, cases.rate(mode.name, o.name), mode.name, _OUTER))
+    found += [reset for k, surface in enumerate(ends) for reset in cases.reset(k, surface.name)]
+    for k, surface in enumerate(ends):
+        what, level = f"level of surface '{surface.name}'", cases.of_parameters(flow.level, k)
+        found.append(Case(what, level, cases.value(surface.level)))
+    return [*found, Case("period", cases.of_parameters(flow.period), cases.value(cases.period))]
 
 
-@dataclass(frozen=True)
-class _Split:
-    """Points taken apart, and compiled functions put together again."""
+@dataclass(eq=False)
+class _Cases:
+    """Points taken apart, and compiled functions put together again; there are no formulas."""
 
     model: Model
+    period: str = ""
 
     @property
     def every(self) -> Any:
@@ -203,135 +206,102 @@ class _Split:
         n = len(self.model.states)
         return point[0], point[1 : 1 + n], point[1 + n :]
 
-    def named(self, point: Any) -> tuple[Any, Any, dict[str, Any]]:
-        t, y, p = self.parts(point)
-        return t, y, dict(zip(self.model.parameter_names, p, strict=True))
-
-    def scalar(self, function: Callable[..., float]) -> Callable[[FloatArray], Jacobian]:
-        """``function(t, y, p, which, grad)`` as a vector function of one value."""
+    def scalar(self, function: Callable[..., float], *index: int) -> Compiled:
+        """``function(*index, t, y, p, which, grad)`` as a vector function of one value."""
 
         def compiled(point: FloatArray) -> Jacobian:
             t, y, p = self.parts(point)
             grad = np.empty(len(point))
-            value = function(t, y.copy(), p.copy(), self.every, grad)
+            value = function(*index, t, y.copy(), p.copy(), self.every, grad)
             return np.array([value]), grad[None, :]
 
         return compiled
 
-    def vector(self, function: Callable[..., None]) -> Callable[[FloatArray], Jacobian]:
-        """``function(t, y, p, which, out, jac)`` as a vector function."""
+    def vector(self, function: Callable[..., None], *index: int) -> Compiled:
+        """``function(*index, t, y, p, which, out, jac)`` as a vector function."""
 
         def compiled(point: FloatArray) -> Jacobian:
             t, y, p = self.parts(point)
             out, jac = np.empty(len(y)), np.empty((len(y), len(point)))
-            function(t, y.copy(), p.copy(), self.every, out, jac)
+            function(*index, t, y.copy(), p.copy(), self.every, out, jac)
             return out, jac
 
         return compiled
 
-    def of_parameters(self, function: Callable[..., float]) -> Callable[[FloatArray], Jacobian]:
-        """``function(p, which, grad)`` as a vector function of one value."""
+    def of_parameters(self, function: Callable[..., float], *index: int) -> Compiled:
+        """``function(*index, p, which, grad)`` as a vector function of one value."""
 
         def compiled(point: FloatArray) -> Jacobian:
             grad = np.zeros(len(point))
             own = np.empty(len(self.model.parameters))
-            value = function(self.parts(point)[2].copy(), self.every, own)
+            value = function(*index, self.parts(point)[2].copy(), self.every, own)
             grad[len(point) - len(own) :] = own
             return np.array([value]), grad[None, :]
 
         return compiled
 
+    def observable(self, name: str) -> Formula:
+        return list
 
-def _observable(split: _Split, exact: Evaluator[Any], name: str, c: int) -> Case:
-    def formula(point: list[Any]) -> list[Any]:
-        t, y, p = split.named(point)
-        return [exact.observable(name, p, t, y)]
+    def rate(self, mode: str, observable: str) -> Formula:
+        return list
 
-    observe = split.model.flow.observe
-    return Case(f"observable '{name}'", split.scalar(lambda *a: observe(c, *a)), formula)
+    def value(self, text: str) -> Formula:
+        return list
 
+    def field(self, m: int, mode: str) -> list[Case]:
+        return []
 
-def _field(split: _Split, exact: Evaluator[Any], field: Any, name: str, m: int) -> Case:
-    def formula(point: list[Any]) -> list[Any]:
-        t, y, p = split.named(point)
-        return exact.field(name, p, t, y)
-
-    what = f"field of mode '{name}'"
-    return Case(what, split.vector(lambda *a: field(m, *a)), formula, name)
+    def reset(self, k: int, surface: str) -> list[Case]:
+        return []
 
 
-@dataclass(frozen=True)
-class _Fields:
-    """Fields in many digits, at points: the rates of all observables of a mode need the same ones."""
+class _Described(_Cases):
+    """The same with the formulas of a description, in many digits."""
 
-    split: _Split
-    exact: Evaluator[Any]
+    def __init__(self, model: Model) -> None:
+        self.description = from_text(model.definition)
+        super().__init__(model, self.description.period or "0")
+        self.exact = digits(self.description)
+        # the rates of all observables of a mode need the same fields
+        self._fields = lru_cache(maxsize=_KEPT)(self._field_at)
 
-    def __call__(self, mode: str, *point: Any) -> list[Any]:
-        t, y, p = self.split.named(point)
-        return self.exact.field(mode, p, t, y)
+    def _at(self, point: Any) -> tuple[dict[str, Any], Any, Any]:
+        t, y, p = self.parts(point)
+        return dict(zip(self.model.parameter_names, p, strict=True)), t, y
 
+    def _field_at(self, mode: str, *point: Any) -> list[Any]:
+        return self.exact.field(mode, *self._at(point))
 
-def _rate(
-    split: _Split,
-    exact: Evaluator[Any],
-    fields: Callable[..., list[Any]],
-    mode_at: tuple[str, int],
-    observable_at: tuple[str, int],
-) -> Case:
-    (mode, m), (observable, c) = mode_at, observable_at
+    def observable(self, name: str) -> Formula:
+        return lambda point: [self.exact.observable(name, *self._at(point))]
 
-    def formula(point: list[Any]) -> list[Any]:
-        t, y, p = split.named(point)
-        velocity = [mpmath.mpf(1), *fields(mode, *point)]
+    def rate(self, mode: str, observable: str) -> Formula:
+        def formula(point: list[Any]) -> list[Any]:
+            (p, t, y), velocity = self._at(point), [mpmath.mpf(1), *self._fields(mode, *point)]
 
-        def along(h: Any) -> Any:
-            place = [a + h * b for a, b in zip([t, *y], velocity, strict=True)]
-            return exact.observable(observable, p, place[0], place[1:])
+            def along(h: Any) -> Any:
+                place = [a + h * b for a, b in zip([t, *y], velocity, strict=True)]
+                return self.exact.observable(observable, p, place[0], place[1:])
 
-        return [(along(_INNER) - along(-_INNER)) / (2 * _INNER)]
+            return [(along(_INNER) - along(-_INNER)) / (2 * _INNER)]
 
-    rate = split.model.flow.rate
-    what = f"rate of '{observable}' in mode '{mode}'"
-    return Case(what, split.scalar(lambda *a: rate(m, c, *a)), formula, mode, _OUTER)
+        return formula
 
+    def value(self, text: str) -> Formula:
+        return lambda point: [self.exact.value(text, self._at(point)[0])]
 
-def _reset(split: _Split, exact: Evaluator[Any], texts: Any, surface: str, k: int) -> Case:
-    def formula(point: list[Any]) -> list[Any]:
-        t, y, p = split.named(point)
-        return [exact.value(texts.get(s, s), p, t, y) for s in split.model.states]
+    def field(self, m: int, mode: str) -> list[Case]:
+        compiled = self.vector(field_of(self.model.definition), m)
+        return [Case(f"field of mode '{mode}'", compiled, lambda x: self._field_at(mode, *x), mode)]
 
-    reset = split.model.flow.reset
-    return Case(f"reset at '{surface}'", split.vector(lambda *a: reset(k, *a)), formula)
+    def reset(self, k: int, surface: str) -> list[Case]:
+        if surface not in self.description.resets:
+            return []
+        texts = self.description.resets[surface]
 
+        def formula(point: list[Any]) -> list[Any]:
+            at = self._at(point)
+            return [self.exact.value(texts.get(s, s), *at) for s in self.model.states]
 
-def _levels(split: _Split, exact: Evaluator[Any], period: str) -> list[Case]:
-    def of(text: str) -> Callable[[list[Any]], list[Any]]:
-        return lambda point: [exact.value(text, split.named(point)[2])]
-
-    flow, found = split.model.flow, []
-    for k, surface in enumerate(split.model.surfaces):
-        compiled = split.of_parameters(lambda *a, k=k: flow.level(k, *a))
-        found.append(Case(f"level of surface '{surface.name}'", compiled, of(surface.level)))
-    compiled = split.of_parameters(flow.period)
-    return [*found, Case("period", compiled, of(period or "0"))]
-
-
-# ----------------------------------------------------------------- models of compiled functions
-
-
-def _closed(probe: Probe) -> list[Case]:
-    model, split = probe.model, _Split(probe.model)
-    flow, none = model.flow, list
-    found = []
-    for c, o in enumerate(model.observables):
-        compiled = split.scalar(lambda *a, c=c: flow.observe(c, *a))
-        found.append(Case(f"observable '{o.name}'", compiled, none))
-        for m, mode in enumerate(model.modes):
-            compiled = split.scalar(lambda *a, m=m, c=c: flow.rate(m, c, *a))
-            what = f"rate of '{o.name}' in mode '{mode.name}'"
-            found.append(Case(what, compiled, none, mode.name))
-    for k, surface in enumerate(model.surfaces):
-        compiled = split.of_parameters(lambda *a, k=k: flow.level(k, *a))
-        found.append(Case(f"level of surface '{surface.name}'", compiled, none))
-    return [*found, Case("period", split.of_parameters(flow.period), none)]
+        return [Case(f"reset at '{surface}'", self.vector(self.model.flow.reset, k), formula)]

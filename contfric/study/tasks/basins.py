@@ -5,12 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from contfric.base.shown import aligned
+from contfric.base.yaml_schema import whole
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Job, StudyCheck, axes_text, grid_text, incomplete
+from contfric.study.tasks.task import (
+    FigureKind,
+    Job,
+    StudyCheck,
+    axes_text,
+    ends_of,
+    grid_text,
+    incomplete,
+    values_of,
+)
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins
@@ -35,9 +44,7 @@ class BasinsTask(Response):
     at: dict[str, float] = Field(
         {}, description="a mapping of the other states, and of phase, to numbers"
     )
-    periods: int | None = Field(
-        None, ge=1, description="a whole number >= 1: periods that a start is followed"
-    )
+    periods: int | None = whole("periods that a start is followed")
 
     def check(self, asked: StudyCheck) -> None:
         """Check the axes, and that every state has a value."""
@@ -49,10 +56,7 @@ class BasinsTask(Response):
         asked.attempt((self.name,), lambda: check_starts(asked.model, self._axes(), self.at))
 
     def _axes(self) -> dict[str, Any]:
-        return {
-            name: np.linspace(values[0], values[1], int(values[2])) if len(values) == 3 else values
-            for name, values in self.grid.items()
-        }
+        return {n: values_of(v) if len(v) == 3 else v for n, v in self.grid.items()}
 
     def does(self, study: Study) -> str:
         """Return the grid in words."""
@@ -76,7 +80,7 @@ class BasinsTask(Response):
     def entry(self, found: Basins) -> dict[str, Any]:
         """Return the grid and the share of each orbit."""
         return {
-            "grid": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in found.axes.items()},
+            "grid": {name: ends_of(values) for name, values in found.axes.items()},
             "at": found.at,
             "complete": found.complete,
             "shares": [vars(share) for share in found.shares],

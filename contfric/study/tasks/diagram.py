@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
-from contfric.base.yaml_schema import Truth, keys_of
+from contfric.base.yaml_schema import Truth, keys_of, whole
 from contfric.study.tasks.one_parameter import OneParameter
 from contfric.study.tasks.task import Job, SeedsEntry, Skipped
 from contfric.study.wanted import Want
@@ -32,18 +32,9 @@ class ExploreTask(OneParameter):
         description="true or false: whether orbits with holds lead on where the Poincare map "
         "is discontinuous",
     )
-    max_periods: int | None = Field(
-        None, ge=1, le=16, description="a whole number from 1 to 16: longest orbits, in periods"
-    )
-    copies: int | None = Field(
-        None,
-        ge=1,
-        le=16,
-        description="a whole number from 1 to 16: most copies of a solution at a sliding event",
-    )
-    max_branches: int | None = Field(
-        None, ge=1, description="a whole number >= 1: most branches to compute"
-    )
+    max_periods: int | None = whole("longest orbits, in periods", most=16)
+    copies: int | None = whole("most copies of a solution at a sliding event", most=16)
+    max_branches: int | None = whole("most branches to compute")
     verify: Truth = Field(
         False, description="true or false: whether the diagram is restarted from its own branches"
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.shown import aligned
+from contfric.base.yaml_schema import positive, whole
 from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
@@ -40,19 +41,17 @@ class EnsembleTask(Response):
         description="a mapping of parameters to [low, high], or to a distribution of scipy.stats with its "
         "arguments, such as {norm: [0.32, 0.01]}"
     )
-    samples: int | None = Field(None, ge=1, description="a whole number >= 1: diagrams")
-    seed: int | None = Field(None, ge=0, description="a whole number >= 0")
+    samples: int | None = whole("diagrams")
+    seed: int | None = whole(least=0)
     row: str | None = Field(None, description="a quantity, of which bands are made")
-    values: int | None = Field(
-        None, ge=2, description="a whole number >= 2: values of the parameter for bands"
-    )
-    max_step: float | None = Field(None, gt=0.0, description="a number > 0")
+    values: int | None = whole("values of the parameter for bands", least=2)
+    max_step: float | None = positive()
     bridges: bool | None = Field(None, description="true or false")
-    max_periods: int | None = Field(None, ge=1, description="a whole number >= 1")
-    copies: int | None = Field(None, ge=1, description="a whole number >= 1")
-    max_branches: int | None = Field(None, ge=1, description="a whole number >= 1")
-    max_points: int | None = Field(None, ge=1, description="a whole number >= 1")
-    workers: int | None = Field(None, ge=1, description="a whole number >= 1: processes")
+    max_periods: int | None = whole()
+    copies: int | None = whole()
+    max_branches: int | None = whole()
+    max_points: int | None = whole()
+    workers: int | None = whole("processes")
 
     def check(self, asked: StudyCheck) -> None:
         """Check the range, the distributions and the quantity."""

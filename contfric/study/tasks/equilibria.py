@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.shown import aligned
+from contfric.base.yaml_schema import positive, whole
 from contfric.errors import checked_range
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
@@ -31,20 +32,9 @@ class EquilibriaTask(Response):
 
     parameter: str = Field(description=PARAMETER)
     range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
-    values: int | None = Field(
-        None,
-        ge=1,
-        description="a whole number >= 1: values of the parameter at which equilibria are looked for",
-    )
-    starts: int | None = Field(
-        None, ge=1, description="a whole number >= 1: starts of Newton's method in a mode"
-    )
-    max_step: float | None = Field(
-        None,
-        gt=0.0,
-        le=1.0,
-        description="a number in (0, 1]: largest step, as a share of the range",
-    )
+    values: int | None = whole("values of the parameter at which equilibria are looked for")
+    starts: int | None = whole("starts of Newton's method in a mode")
+    max_step: float | None = positive("largest step, as a share of the range", most=1.0)
 
     def check(self, asked: StudyCheck) -> None:
         """Check the parameter, its range, and that the model has formulas."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from contfric.base.yaml_schema import positive, whole
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import (
     STATE,
@@ -16,8 +17,10 @@ from contfric.study.tasks.task import (
     Job,
     StudyCheck,
     axes_text,
+    ends_of,
     grid_text,
     incomplete,
+    values_of,
 )
 
 if TYPE_CHECKING:
@@ -40,21 +43,11 @@ class LyapunovTask(Response):
         max_length=2,
         description="a mapping of two parameters, each to [low, high, number of values]",
     )
-    periods: int | None = Field(
-        None, ge=1, description="a whole number >= 1: most periods to average over"
-    )
-    transient: int | None = Field(
-        None, ge=0, description="a whole number >= 0: periods before averaging begins"
-    )
-    tolerance: float | None = Field(
-        None, gt=0.0, description="a number > 0: relative error at which averaging ends"
-    )
-    confirm: int | None = Field(
-        None, ge=0, description="a whole number >= 0: periods that chaos is followed further"
-    )
-    starts: int | None = Field(
-        None, ge=1, description="a whole number >= 1: initial conditions at each point"
-    )
+    periods: int | None = whole("most periods to average over")
+    transient: int | None = whole("periods before averaging begins", least=0)
+    tolerance: float | None = positive("relative error at which averaging ends")
+    confirm: int | None = whole("periods that chaos is followed further", least=0)
+    starts: int | None = whole("initial conditions at each point")
     state: list[float] | None = Field(None, description=f"{STATE}: where every trajectory starts")
 
     def check(self, asked: StudyCheck) -> None:
@@ -81,7 +74,7 @@ class LyapunovTask(Response):
         study = job.study
         return lyapunov_map(
             study.model,
-            {name: np.linspace(low, high, int(n)) for name, (low, high, n) in self.grid.items()},
+            {name: values_of(ends) for name, ends in self.grid.items()},
             {name: value for name, value in study.params.items() if name not in self.grid},
             folder=job.tiles,
             progress=job.told(self.name),
@@ -91,10 +84,7 @@ class LyapunovTask(Response):
     def entry(self, found: LyapunovMap) -> dict[str, Any]:
         """Return what the trajectories of a map turned out to be."""
         return {
-            "grid": {
-                name: [float(values[0]), float(values[-1]), len(values)]
-                for name, values in found.axes.items()
-            },
+            "grid": {name: ends_of(values) for name, values in found.axes.items()},
             "params": found.params,
             "starts": found.starts,
             "complete": found.complete,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import positive, whole
 from contfric.study.tables import Table, points
 from contfric.study.tasks.diagram_record import entries_of, lines_of
 from contfric.study.tasks.orbit import POINTS, points_text
@@ -43,15 +44,8 @@ class OneParameter(Task):
 
     parameter: str = Field(description=PARAMETER)
     range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
-    max_step: float | None = Field(
-        None,
-        gt=0.0,
-        le=1.0,
-        description="a number in (0, 1]: largest step, as a share of the range",
-    )
-    max_points: int | None = Field(
-        None, ge=10, description="a whole number >= 10: most points of each side of a branch"
-    )
+    max_step: float | None = positive("largest step, as a share of the range", most=1.0)
+    max_points: int | None = whole("most points of each side of a branch", least=10)
     stop_at: dict[str, float] | None = Field(
         None,
         description="a mapping of quantities to the value at which a branch ends, such as {x_max: 1.4}",

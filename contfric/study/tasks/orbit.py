@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.base.yaml_schema import SchemaPart, keys_of
+from contfric.base.yaml_schema import SchemaPart, keys_of, whole
 from contfric.study.tables import Table, points
 from contfric.study.tasks.task import STATE, FigureKind, Found, Job, Skipped, StudyCheck, Task
 from contfric.study.wanted import COLUMNS
@@ -27,12 +27,8 @@ class Simulated(SchemaPart):
 
     state: list[float] | None = Field(None, description=STATE)
     time: float = Field(0.0, description="a finite number: the initial time")
-    periods: int | None = Field(
-        None, ge=1, le=64, description="a whole number from 1 to 64: the period wanted"
-    )
-    longest: int | None = Field(
-        None, ge=200, description="a whole number >= 200: periods to simulate at most"
-    )
+    periods: int | None = whole("the period wanted", most=64)
+    longest: int | None = whole("periods to simulate at most", least=200)
 
 
 class Start(Task):

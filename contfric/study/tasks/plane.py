@@ -7,10 +7,19 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
-from contfric.base.yaml_schema import keys_of
+from contfric.base.yaml_schema import keys_of, positive, whole
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
-from contfric.study.tasks.task import FigureKind, Found, Job, SeedsEntry, StudyCheck, Task
+from contfric.study.tasks.task import (
+    FigureKind,
+    Found,
+    Job,
+    SeedsEntry,
+    StudyCheck,
+    Task,
+    pairs_of,
+    ranges_text,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,24 +55,10 @@ class PlaneTask(Task):
         None, min_length=1, description="a list with any of SN, BP, PD, CS, SS, AS, GS, T"
     )
     seeds: SeedsEntry | None = Field(None, description=keys_of(SeedsEntry))
-    max_step: float | None = Field(
-        None,
-        gt=0.0,
-        le=1.0,
-        description="a number in (0, 1]: largest step, as a share of the ranges",
-    )
-    max_periods: int | None = Field(
-        None,
-        ge=1,
-        le=16,
-        description="a whole number from 1 to 16: longest orbits whose curves count",
-    )
-    max_curves: int | None = Field(
-        None, ge=1, description="a whole number >= 1: most curves to compute"
-    )
-    max_sections: int | None = Field(
-        None, ge=1, description="a whole number >= 1: most sections, those of the study among them"
-    )
+    max_step: float | None = positive("largest step, as a share of the ranges", most=1.0)
+    max_periods: int | None = whole("longest orbits whose curves count", most=16)
+    max_curves: int | None = whole("most curves to compute")
+    max_sections: int | None = whole("most sections, those of the study among them")
 
     def check(self, asked: StudyCheck) -> None:
         """Check ranges, sections and kinds."""
@@ -71,11 +66,7 @@ class PlaneTask(Task):
         from contfric.curves.ranges import box_of
 
         one, other = self.parameters
-        ranges = {name: (pair[0], pair[-1]) for name, pair in self.range.items()}
-        wrong = next((name for name, pair in self.range.items() if len(pair) != 2), None)
-        if wrong is not None:
-            text = f"the range of '{wrong}' is two numbers [low, high]"
-            asked.fail(("plane", "range", wrong), text)
+        ranges = asked.check_ranges(self.name, self.range)
         asked.attempt(("plane",), lambda: box_of(asked.model, (one, other), ranges))
         self._check_sections(asked, ranges)
         known = [kind.value for kind in Kind if kind is not Kind.NS]
@@ -97,7 +88,7 @@ class PlaneTask(Task):
 
     def does(self, study: Study) -> str:
         """Return the curves in words."""
-        where = ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in self.range.items())
+        where = ranges_text(self.range)
         kinds = "" if self.kinds is None else f" of {', '.join(self.kinds)}"
         return f"every curve{kinds} that can be reached, {where}, and what lives between them"
 
@@ -112,7 +103,7 @@ class PlaneTask(Task):
         return explore_plane(
             job.found["orbit"],
             (self.parameters[0], self.parameters[1]),
-            {name: (pair[0], pair[1]) for name, pair in self.range.items()},
+            pairs_of(self.range),
             self.sections,
             progress=job.told(self.name),
             **self.options(),

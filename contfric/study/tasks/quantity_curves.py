@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import positive, whole
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Found, Job, StudyCheck
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck, pairs_of, ranges_text
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from contfric.curves.quantity_curve import QuantityCurve
-    from contfric.study.drawings import Drawing
     from contfric.study.read import Study
 
 
@@ -32,15 +30,8 @@ class QuantityCurveTask(Response):
     range: dict[str, list[float]] = Field(
         description="a mapping of these parameters to two finite numbers [low, high]"
     )
-    max_step: float | None = Field(
-        None,
-        gt=0.0,
-        le=1.0,
-        description="a number in (0, 1]: largest step, as a share of the ranges",
-    )
-    max_points: int | None = Field(
-        None, ge=2, description="a whole number >= 2: most points of each side"
-    )
+    max_step: float | None = positive("largest step, as a share of the ranges", most=1.0)
+    max_points: int | None = whole("most points of each side", least=2)
 
     def check(self, asked: StudyCheck) -> None:
         """Check the quantity, the parameters and their ranges."""
@@ -51,31 +42,12 @@ class QuantityCurveTask(Response):
             (self.name, "quantity"),
             lambda: number_quantity(self.quantity, asked.model, "a curve"),
         )
-        for name, pair in self.range.items():
-            if len(pair) != 2:
-                asked.fail(
-                    (self.name, "range", name),
-                    f"the range of '{name}' is two numbers [low, high]",
-                )
-        asked.attempt(
-            (self.name,), lambda: ranges_of(asked.model, tuple(self.parameters), self._ranges())
-        )
+        ranges = asked.check_ranges(self.name, self.range)
+        asked.attempt((self.name,), lambda: ranges_of(asked.model, tuple(self.parameters), ranges))
 
-    def _ranges(self) -> dict[str, tuple[float, float]]:
-        return {name: (pair[0], pair[1]) for name, pair in self.range.items()}
-
-    def _where(self) -> str:
-        return ", ".join(f"{n} from {r[0]:g} to {r[1]:g}" for n, r in self.range.items())
-
-    def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
-        """Draw the curve in the plane of its first two parameters."""
-        from contfric.plot.names import full_title
-        from contfric.plot.style import TEXT, sized
-
-        curve = found[self.result]
-        fixed = {n: float(v[0]) for n, v in curve.params.items() if n not in curve.parameters}
-        text = full_title(title, curve.model.parameter_names, fixed)
-        curve.plot(ax=figure.add_subplot()).set_title(text, fontsize=sized(TEXT))
+    def fixed(self, found: QuantityCurve) -> dict[str, float]:
+        """Return the parameters that do not vary along the curve."""
+        return {n: float(v[0]) for n, v in found.params.items() if n not in found.parameters}
 
     def cut_short(self, found: QuantityCurve) -> bool:
         """Tell whether Ctrl-C ended it."""
@@ -116,7 +88,7 @@ class HoldTask(QuantityCurveTask):
 
     def does(self, study: Study) -> str:
         """Return the curve in words."""
-        return f"orbits with {self.quantity} = {self.value:g}, {self._where()}"
+        return f"orbits with {self.quantity} = {self.value:g}, {ranges_text(self.range)}"
 
     def compute(self, job: Job) -> QuantityCurve:
         """Follow the curve both ways."""
@@ -125,7 +97,7 @@ class HoldTask(QuantityCurveTask):
         one, other = self.parameters
         start = job.found["orbit"], self.quantity, self.value
         return continue_quantity(
-            *start, (one, other), self._ranges(), progress=job.say, **self.options()
+            *start, (one, other), pairs_of(self.range), progress=job.say, **self.options()
         )
 
 
@@ -140,11 +112,11 @@ class ExtremumTask(QuantityCurveTask):
     def does(self, study: Study) -> str:
         """Return the curve in words."""
         extreme = ", ".join(self.parameters[:-1])
-        return f"orbits at which {self.quantity} is extreme in {extreme}, {self._where()}"
+        return f"orbits at which {self.quantity} is extreme in {extreme}, {ranges_text(self.range)}"
 
     def compute(self, job: Job) -> QuantityCurve:
         """Follow the curve both ways."""
         from contfric.curves.extremum import continue_extremum
 
         start = job.found["orbit"], self.quantity, tuple(self.parameters)
-        return continue_extremum(*start, self._ranges(), progress=job.say, **self.options())
+        return continue_extremum(*start, pairs_of(self.range), progress=job.say, **self.options())

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from contfric.base.yaml_schema import positive, whole
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import FigureKind, Job, StudyCheck
 
@@ -26,12 +27,8 @@ class ReleaseMapTask(Response):
     figures: ClassVar = {"release_map": FigureKind(6.4, 6.0)}
 
     surface: str | None = Field(None, description="the name of a surface that rest is left at")
-    count: int | None = Field(
-        None, ge=2, description="a whole number >= 2: phases at which releases are looked for"
-    )
-    periods: float | None = Field(
-        None, gt=0.0, description="a number > 0: periods within which the next release has to come"
-    )
+    count: int | None = whole("phases at which releases are looked for", least=2)
+    periods: float | None = positive("periods within which the next release has to come")
 
     def check(self, asked: StudyCheck) -> None:
         """Check that releases of the model are told by their phase, and the surface."""

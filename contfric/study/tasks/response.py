@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.base.yaml_schema import positive
 from contfric.study.tasks.task import STATE, Found, StudyCheck, Task
 
 if TYPE_CHECKING:
@@ -24,18 +25,30 @@ class Sense(str, Enum):
 
 
 class Response(Task):
-    """A task whose result plots itself."""
+    """A task whose result plots itself.
+
+    Attributes
+    ----------
+    under : name of the result that is drawn beneath, if the study has it
+    """
+
+    under: ClassVar[str] = ""
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Let the result draw itself, with the parameters that it keeps in the title."""
         from contfric.plot.names import full_title
         from contfric.plot.style import TEXT, sized
 
-        response = found[self.result]
-        fixed = dict(response.params)
-        fixed.pop(getattr(response, "parameter", ""), None)
-        text = full_title(title, response.model.parameter_names, fixed)
-        response.plot(ax=figure.add_subplot()).set_title(text, fontsize=sized(TEXT))
+        response, axes = found[self.result], figure.add_subplot()
+        if self.under in found:
+            found[self.under].plot(ax=axes)
+        text = full_title(title, response.model.parameter_names, self.fixed(response))
+        response.plot(ax=axes).set_title(text, fontsize=sized(TEXT))
+
+    def fixed(self, found: Any) -> dict[str, float]:
+        """Return the parameters that have one value all over the figure."""
+        varied = getattr(found, "parameter", "")
+        return {name: value for name, value in found.params.items() if name != varied}
 
 
 class SectionTask(Response):
@@ -48,9 +61,7 @@ class SectionTask(Response):
         None, description="one of either, rising, falling"
     )
     state: list[float] | None = Field(None, description=STATE)
-    periods: float | None = Field(
-        None, gt=0.0, description="a number > 0: periods of which points are collected"
-    )
+    periods: float | None = positive("periods of which points are collected")
     transient: float | None = Field(
         None, ge=0.0, description="a number >= 0: periods before points are collected"
     )

@@ -6,11 +6,18 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from contfric.study.tasks.response import SectionTask
-from contfric.study.tasks.task import PARAMETER, FigureKind, Job, StudyCheck, incomplete
+from contfric.study.tasks.task import (
+    PARAMETER,
+    FigureKind,
+    Job,
+    StudyCheck,
+    ends_of,
+    incomplete,
+    values_of,
+)
 
 if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
@@ -60,12 +67,11 @@ class SweepTask(SectionTask):
         """Simulate; a killed run goes on from its tiles."""
         from contfric.response.sweeping import sweep
 
-        low, high, count = self.values
         others = {n: value for n, value in job.study.params.items() if n != self.parameter}
         return sweep(
             job.study.model,
             self.parameter,
-            np.linspace(low, high, int(count)),
+            values_of(self.values),
             others,
             folder=job.tiles,
             progress=job.say,
@@ -76,7 +82,7 @@ class SweepTask(SectionTask):
         """Return the values and what the trajectory converged to at each."""
         return {
             "parameter": found.parameter,
-            "values": [float(found.values[0]), float(found.values[-1]), len(found.values)],
+            "values": ends_of(found.values),
             "params": found.params,
             "section": found.section,
             "complete": found.complete,

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn, TypeAlias
 
-from pydantic import Field
+import numpy as np
 
-from contfric.base.yaml_schema import SchemaPart, keys_of
+from contfric.base.yaml_schema import SchemaPart, keys_of, whole
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from contfric.base.yaml_lines import Address, LocatedYaml
-    from contfric.models.definition import Model
+    from contfric.models.definition import FloatArray, Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile
@@ -122,6 +122,17 @@ class StudyCheck:
                 f"the values of {name} are [low, high, number of values], with low < high and a whole "
                 f"number of at least 2, got {values}",
             )
+
+    def check_ranges(
+        self, task: str, ranges: Mapping[str, list[float]]
+    ) -> dict[str, tuple[float, float]]:
+        """Check that every range is two numbers, and return them."""
+        for name, pair in ranges.items():
+            if len(pair) != 2:
+                self.fail(
+                    (task, "range", name), f"the range of '{name}' is two numbers [low, high]"
+                )
+        return pairs_of(ranges)
 
 
 class Task(SchemaPart):
@@ -231,9 +242,9 @@ class Task(SchemaPart):
 class SeedsEntry(SchemaPart):
     """Simulations whose attractors start branches that nothing else reaches."""
 
-    values: int = Field(20, ge=1, description="a whole number >= 1: values of the parameter")
-    states: int = Field(3, ge=1, description="a whole number >= 1: initial conditions at each")
-    seed: int = Field(0, ge=0, description="a whole number >= 0: seed of the random ones")
+    values: int = whole("values of the parameter", default=20)
+    states: int = whole("initial conditions at each", default=3)
+    seed: int = whole("seed of the random ones", least=0, default=0)
 
     def argument(self) -> dict[str, Any]:
         """Return the argument ``seeds`` of an exploration."""
@@ -245,6 +256,33 @@ class SeedsEntry(SchemaPart):
 def axes_text(grid: Mapping[str, list[float]]) -> str:
     """Return a grid in words."""
     return " x ".join(f"{n} from {v[0]:g} to {v[1]:g} ({v[2]:g})" for n, v in grid.items())
+
+
+def pairs_of(ranges: Mapping[str, list[float]]) -> dict[str, tuple[float, float]]:
+    """Return ranges as they are computed with."""
+    return {name: (pair[0], pair[1]) for name, pair in ranges.items()}
+
+
+def ranges_text(ranges: Mapping[str, list[float]]) -> str:
+    """Return ranges in words.
+
+    Examples
+    --------
+    >>> ranges_text({"S": [0.1, 0.4]})
+    'S from 0.1 to 0.4'
+    """
+    return ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in ranges.items())
+
+
+def values_of(ends: list[float]) -> FloatArray:
+    """Return the values of an axis that [low, high, number of values] stands for."""
+    low, high, count = ends
+    return np.linspace(low, high, int(count))
+
+
+def ends_of(values: FloatArray) -> list[float]:
+    """Return [low, high, number of values] of an axis, as a record has it."""
+    return [float(values[0]), float(values[-1]), len(values)]
 
 
 def grid_text(entry: dict[str, Any]) -> str:
