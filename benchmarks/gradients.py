@@ -1,16 +1,18 @@
 """What gradients cost, against the solve of the orbit: ``python benchmarks/gradients.py``.
 
-Each round times all of them once, one after the other, so that what else runs on the machine meets all
-alike; what is shown is the least time over rounds, and ratios of such times. Solves are compared with: by
-simulation (find_orbit); the user's call of a signature, from nothing; Newton's method from an orbit at
-parameters a thousandth away, the call of one kernel; and a point of a branch, with its multipliers and
-margins. A gradient is asked of the orbit as find_orbit returns it, so that it is what comes on top of the
+Each round times each of them three times in a row (the first one finds other code in the processor's
+caches), one after the other, so that what else runs on the machine meets all alike; the least of three
+counts, and ratios are medians over rounds of the ratio within one. Solves are compared with: by simulation
+(find_orbit); the user's call of a signature, from nothing; Newton's method from an orbit at parameters a
+thousandth away, the call of one kernel; and a point of a branch, with its multipliers and margins.
+A gradient is asked of the orbit as find_orbit returns it, so that it is what comes on top of the
 solve; "several" are all of them, asked of one orbit. "orbit" is dz/dp, the derivatives of all joints by all
 parameters, which they share; every other one has it computed anew.
 """
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable
 from copy import copy
@@ -21,7 +23,7 @@ import contfric as cf
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.solve import refine
 
-ROUNDS = 40
+ROUNDS, REPEATS = 20, 3
 SOLVES = ("find_orbit", "the user's call", "Newton's method", "a branch")
 QUANTITIES = ("x_max", "mean({v})", "rms({v})", "amplitude({x}, 1)", "energy")
 #: Cases: model, signature (or none: found by simulation), parameters, and a range of one parameter.
@@ -36,10 +38,13 @@ CASES: dict[str, tuple[str, str, dict[str, float], str, tuple[float, float]]] = 
 
 
 def seconds(call: Callable[[], Any]) -> float:
-    """Return how long a call takes, in time of the processor."""
-    start = time.process_time()
-    call()
-    return time.process_time() - start
+    """Return how long a call takes, in time of the processor: the least of some in a row."""
+    found = []
+    for _ in range(REPEATS):
+        start = time.process_time()
+        call()
+        found.append(time.process_time() - start)
+    return min(found)
 
 
 def calls(name: str) -> dict[str, Callable[[], Any]]:
@@ -86,16 +91,16 @@ def main() -> None:
         for call in timed.values():
             call()
         rounds = [{what: seconds(call) for what, call in timed.items()} for _ in range(ROUNDS)]
-        least = {what: min(each[what] for each in rounds) for what in timed}
-        if "a branch" in least:
-            least["a branch"] /= points
+        for each in rounds:
+            each["a branch"] = each.get("a branch", 0.0) / points
         solves = [what for what in SOLVES if what in timed]
         print(
             f"\n{name}: ms, and as a share of {', '.join(solves)} (a branch: of one of its points)"
         )
-        for what, time_taken in least.items():
-            ratios = "  ".join(f"{time_taken / least[solve]:9.3f}" for solve in solves)
-            print(f"{what:28s} {time_taken * 1e3:8.3f}  {ratios}")
+        for what in timed:
+            median = statistics.median(each[what] for each in rounds) * 1e3
+            ratios = [statistics.median(each[what] / each[s] for each in rounds) for s in solves]
+            print(f"{what:28s} {median:8.3f}  " + "  ".join(f"{ratio:9.3f}" for ratio in ratios))
 
 
 if __name__ == "__main__":

@@ -191,7 +191,8 @@ def unfolded(p, which, grad):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-_KERNELS = {
+#: The functions of the model with more states, by what they are to it.
+KERNELS = {
     name: Kernel(function, with_handle(signature, CARRYING))
     for name, function, signature in (
         ("field", field, field_signature),
@@ -232,7 +233,7 @@ def _carried(model: Model, operations: bytes, constants: bytes, outputs: bytes) 
     own |= {"rows": len(rows) // 4, "integrals": len(results), "numbers": len(numbers)}
     own |= {"states": len(model.states), "parameters": len(model.parameter_names)}
     block = Block(LAYOUT, own)
-    changed: dict[str, Any] = {name: Bound(each, block) for name, each in _KERNELS.items()}
+    changed: dict[str, Any] = {name: Bound(each, block) for name, each in KERNELS.items()}
     # solutions of affine modes are integrated as well: a closed form knows no integrals
     changed |= {"sides": {}, "idle": (), "timed": (), "affine": None, "period": unfolded}
     more = dataclasses.replace(functions, **changed)

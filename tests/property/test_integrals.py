@@ -18,7 +18,7 @@ from contfric.quantities.registry import quantity_of
 MODELS = ("coulomb", "impact", "popp", "belt", "thermostat", "relay-sliding", "gear-pair")
 MORE = ("stribeck", "lugre", "rocking-block", "normal-force", "two-blocks")
 #: Of these some mode is integrated.
-CARRIED = ("stribeck", "lugre", "normal-force", "pendulum")
+CARRIED = ("stribeck", "lugre", "pendulum")
 #: Of integrated flow with boundary layers derivatives are known to a few times its rounding, amplified.
 TOLERANCE = {"stribeck": 1e-9, "lugre": 1e-7, "normal-force": 1e-9}
 
