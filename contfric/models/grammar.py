@@ -13,6 +13,7 @@ import ast
 import keyword
 import math
 import re
+import sys
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -164,11 +165,7 @@ def _check_number(node: ast.Constant, source: str) -> None:
     value = node.value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ModelError(f"in '{_short(source)}': {value!r} is no number")
-    try:
-        finite = math.isfinite(value)
-    except OverflowError:
-        finite = False
-    if not finite:
+    if not abs(value) <= sys.float_info.max:
         raise ModelError(f"in '{_short(source)}': a number is too large")
 
 
