@@ -271,4 +271,5 @@ def with_chatter(flow: CompiledFlow, modes: int, chatters: Sequence[ChatterMode]
         "stationary": Block(LAYOUT, values),
         "second": Block(LAYOUT, {**tables, "second": flow.second or no_second}),
     }
-    return replace(flow, **{name: Bound(KERNELS[name], block) for name, block in blocks.items()})
+    changed: dict[str, Any] = {name: Bound(KERNELS[name], block) for name, block in blocks.items()}
+    return replace(flow, **changed, made_of=None)

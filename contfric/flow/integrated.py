@@ -130,6 +130,11 @@ class Functions:
             raise ValueError(f"modes in closed form need the explicit method, not '{method.value}'")
 
     @property
+    def in_closed_form(self) -> bool:
+        """Whether no mode is integrated: all are affine, and no kink cuts them."""
+        return self.affine is not None and not self.kinks and len(self.affine.closed) == self.modes
+
+    @property
     def kind(self) -> FlowKind:
         """Which kernels the solutions are found by."""
         return FlowKind.PLAIN if Method(self.method) is Method.EXPLICIT else FlowKind.STIFF
@@ -144,7 +149,8 @@ class Functions:
         """
         flow, hit, stationary = (Bound(kernel, self.block) for kernel in kernels_of(self.kind))
         rate = others.pop("rate", self.rate)
-        return CompiledFlow(flow, self.observe, level, stationary, hit, self.period, rate, **others)
+        own = flow, self.observe, level, stationary, hit, self.period, rate
+        return CompiledFlow(*own, made_of=self, **others)
 
     @cached_property
     def block(self) -> Block:

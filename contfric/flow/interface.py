@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from contfric.flow.integrated import Functions
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,7 @@ class CompiledFlow:
     second : second derivatives in a direction, for curves in two parameters; without it they are
         differences of the first ones
     together : first hits of many motions at once, with derivatives; without it each is asked for by itself
+    made_of : the functions of the model that solutions are integrated from; None of a flow that is not
     """
 
     flow: Any
@@ -41,6 +45,7 @@ class CompiledFlow:
     reset: Any = field(default=None, kw_only=True)
     second: Any = field(default=None, kw_only=True)
     together: Any = field(default=None, kw_only=True)
+    made_of: Functions | None = field(default=None, kw_only=True)
 
     def functions(self) -> int:
         """Return the functions as kernels take them: a handle (:mod:`contfric.flow.layouts`)."""

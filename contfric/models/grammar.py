@@ -13,8 +13,9 @@ import ast
 import keyword
 import math
 import re
+import sys
 import unicodedata
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -164,12 +165,14 @@ def _check_number(node: ast.Constant, source: str) -> None:
     value = node.value
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ModelError(f"in '{_short(source)}': {value!r} is no number")
-    try:
-        finite = math.isfinite(value)
-    except OverflowError:
-        finite = False
-    if not finite:
+    if not abs(value) <= sys.float_info.max:
         raise ModelError(f"in '{_short(source)}': a number is too large")
+
+
+def unknown_function(name: str, known: Sequence[str], source: str) -> str:
+    """Return what to say of a function that there is not."""
+    hint = _JUMPS if name in _STAIRCASES else did_you_mean(name, known)
+    return f"in '{_short(source)}': unknown function '{name}'{hint} (a product needs its *)"
 
 
 def _check_call(node: ast.Call, source: str, depth: int) -> None:
@@ -180,10 +183,7 @@ def _check_call(node: ast.Call, source: str, depth: int) -> None:
         )
     name, count = node.func.id, len(node.args)
     if name not in FUNCTIONS:
-        hint = _JUMPS if name in _STAIRCASES else did_you_mean(name, FUNCTIONS)
-        raise ModelError(
-            f"in '{_short(source)}': unknown function '{name}'{hint} (a product needs its *)"
-        )
+        raise ModelError(unknown_function(name, FUNCTIONS, source))
     if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
         raise ModelError(f"in '{_short(source)}': {name}() takes plain arguments")
     wanted = "3" if name == "where" else "1" if name in UNARY else "2 or more"

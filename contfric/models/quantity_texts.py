@@ -10,13 +10,14 @@ functionals, is what it carries.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.models.grammar import names_in, number_of, parse
+from contfric.models.grammar import FUNCTIONS, names_in, number_of, parse, unknown_function
 
 #: Names that mean the same for every model; what they are is in :mod:`contfric.quantities.registry`.
 BUNDLED = (
@@ -95,7 +96,10 @@ def read(text: str) -> Parsed:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         parse(text)  # which says what is wrong with it
         raise
-    return Parsed(parse(outer), taking.found)
+    try:
+        return Parsed(parse(outer), taking.found)
+    except ModelError as error:
+        raise ModelError(taking.as_written(str(error))) from None
 
 
 class _Taking(ast.NodeTransformer):
@@ -112,6 +116,8 @@ class _Taking(ast.NodeTransformer):
             text = ast.unparse(node)
             raise ModelError(f"{text} varies along an orbit: write a functional of it, max({text})")
         several = kind in ("max", "min") and len(node.args) != 1
+        if kind and kind not in (known := dict.fromkeys((*FUNCTIONALS, WORK, *FUNCTIONS))):
+            raise ModelError(unknown_function(kind, tuple(known), ast.unparse(node)))
         if kind not in (*FUNCTIONALS, WORK) or several:
             return self.generic_visit(node)
         text = ast.unparse(node)
@@ -119,6 +125,11 @@ class _Taking(ast.NodeTransformer):
         if name not in self.found:
             self.found[name] = _functional(kind, node)
         return ast.copy_location(ast.Name(name, ast.Load()), node)
+
+    def as_written(self, message: str) -> str:
+        """Return a message with functionals in the place of their names."""
+        written = {name: text for text, name in self.names.items()}
+        return re.sub(r"\b_\d+\b", lambda found: written.get(found[0], found[0]), message)
 
 
 class _Plain(ast.NodeTransformer):

@@ -21,19 +21,20 @@ from contfric.quantities.panels import (
     DEEPEST,
     FALLS,
     HALVED,
-    NODES,
     NOISE,
-    POINTS,
     ROUNDING,
-    SERIES,
-    WEIGHTS,
+    gauss_rule,
 )
 from contfric.quantities.tape import Tape
 
-#: The last eight coefficients of a Legendre series, from the values at the nodes.
-_LAST = np.ascontiguousarray(SERIES[-8:])
-#: Pairs of coefficients from the last one to twice the degree; a third of them that are compared.
-_PAIRS, _THIRD = 8.0, 1.0 / 3.0
+#: Nodes of a part: with these the square of a state is resolved over a half swing, and with the 16 of
+#: :mod:`contfric.quantities.panels` it is not, so that three times as many are evaluated.
+NODES = 20
+POINTS, WEIGHTS, _SERIES = gauss_rule(NODES)
+#: The last eight coefficients of a Legendre series, from the values at the nodes; a row for each node.
+_LAST = np.ascontiguousarray(_SERIES[-8:].T)
+#: Pairs of coefficients from the last one to twice the degree; a third of the four that are compared.
+_PAIRS, _THIRD = 0.5 * NODES, 1.0 / 3.0
 #: Entries of a part that waits: its ends, depth, the share of noise of the part that it is a half of, in
 #: values alone and with derivatives; what is asked of it first; which half it is; then sizes.
 LOW, HIGH, DEPTH, LIGHT, EXACT, ASKED, HALF, SIZES = range(8)
@@ -314,25 +315,31 @@ def sample_at_once(course, layout, i, d_period, own, data):  # type: ignore[no-u
 def left_over(column, size):  # type: ignore[no-untyped-def]
     """Return the largest of the last two coefficients of a series, and what Gauss' formula misses; by size.
 
+    Infinite where something is no number.
+
     That formula is exact to twice the degree. What it misses is of the size of the coefficients from there
     on, if coefficients, in pairs, go on to fall at least as slowly as they did over the last four pairs.
     """
-    top, one, two, three, four = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(NODES):
-        top = max(top, abs(column[k]))
-    for j in range(8):
-        value = 0.0
-        for k in range(NODES):
-            value += _LAST[j, k] * column[k]
-        value = abs(value)
-        if j < 2:
-            one = max(one, value)
-        elif j < 4:
-            two = max(two, value)
-        elif j < 6:
-            three = max(three, value)
-        else:
-            four = max(four, value)
+    top, a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(NODES):  # sums next to each other: each alone would wait for its own last term
+        value = column[k]
+        top = max(top, abs(value))
+        a += _LAST[k, 0] * value
+        b += _LAST[k, 1] * value
+        c += _LAST[k, 2] * value
+        d += _LAST[k, 3] * value
+        e += _LAST[k, 4] * value
+        f += _LAST[k, 5] * value
+        g += _LAST[k, 6] * value
+        h += _LAST[k, 7] * value
+    if not math.isfinite(a):  # what is no number is in all sums
+        return np.inf, np.inf
+    one, two, three, four = (
+        max(abs(a), abs(b)),
+        max(abs(c), abs(d)),
+        max(abs(e), abs(f)),
+        max(abs(g), abs(h)),
+    )
     own = max(top, size, 1e-300)
     if four == 0.0:
         return 0.0, 0.0
@@ -348,9 +355,6 @@ def noise_of(data, sizes):  # type: ignore[no-untyped-def]
     left, missed = 0.0, 0.0
     for j in range(data.shape[0]):
         for k in range(NODES):
-            for c in range(data.shape[2]):
-                if not math.isfinite(data[j, k, c]):
-                    return np.inf, np.inf
             sizes[j] = max(sizes[j], abs(data[j, k, 0]))
         for c in range(data.shape[2]):
             tail, beyond = left_over(data[j, :, c], sizes[j])

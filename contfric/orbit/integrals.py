@@ -16,15 +16,14 @@ changes its sign inside of a panel, or nothing resolves it, this says so, and th
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, table, vector
+from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
-from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.integral_parts import (
     AFTER_A_CUT,
@@ -37,6 +36,7 @@ from contfric.orbit.integral_parts import (
     HIGH,
     LIGHT,
     LOW,
+    NODES,
     SECOND_HALF,
     SIZES,
     VALUES_FIRST,
@@ -48,16 +48,15 @@ from contfric.orbit.integral_parts import (
     sample_at_once,
     sample_part,
 )
+from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment
 from contfric.orbit.peak import Extreme, ExtremeType, extreme_workspace, fill_cycle
 from contfric.orbit.system import IntArray
 from contfric.quantities.motion import goes_on
-from contfric.quantities.panels import DEEPEST, NODES, RESOLVED, ROUNDING, resolved_level
+from contfric.quantities.panels import DEEPEST, RESOLVED, ROUNDING, resolved_level
 from contfric.quantities.tape import Tape
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
-
-TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
 
 
 @helper
@@ -148,63 +147,6 @@ def over_segment(course, level, own, whole):  # type: ignore[no-untyped-def]
         for j in range(data.shape[0]):
             row[j, 2 + course.begin.shape[0]] += row[j, 0] / course.lasts
     return True
-
-
-@helper
-def add_to_joints(layout, whole, i, row, reset, on_joints, on_parameters, d_period):  # type: ignore[no-untyped-def]
-    """Add the gradient of an integral over segment i of the whole orbit to that by the joints of one turn.
-
-    Parameters
-    ----------
-    row : by start time, start state, duration, parameters and the extra one, after the value
-    reset : derivatives of the reset in which the segment begins
-    """
-    count, m = on_joints.shape
-    n, base, free = m - 1, i % count, d_period.shape[0]
-    if whole.resets[i] >= 0:
-        for k in range(free):
-            for j in range(n):
-                row[3 + n + k] += row[2 + j] * reset[j, 1 + n + k]
-        for j in range(n):
-            row[1] += row[2 + j] * reset[j, 0]
-    for k in range(n):
-        value = row[2 + k]
-        if whole.resets[i] >= 0:
-            value = 0.0
-            for j in range(n):
-                value += row[2 + j] * reset[j, 1 + k]
-        if i < count:
-            on_joints[base, 1 + k] += value
-            continue
-        for j in range(n):
-            on_joints[base, 1 + j] += value * layout.closure[k, j]
-    by_start, by_duration, by_turn = row[1], row[2 + n], 0.0
-    on_joints[base, 0] += by_start - by_duration
-    if layout.turn == 0.0 and i < count < whole.modes.shape[0]:
-        on_joints[0, 0] += by_start  # the end of the whole orbit is at time 0
-    if i >= count:
-        by_turn += by_start
-    if base + 1 < count:
-        on_joints[base + 1, 0] += by_duration
-    elif layout.turn != 0.0:
-        on_joints[0, 0] += by_duration
-        by_turn += by_duration
-    for k in range(free):
-        on_parameters[k] += row[3 + n + k] + by_turn * layout.turn * d_period[k]
-    on_parameters[free] += row[3 + n + free]
-
-
-@helper
-def enter_segment(functions, whole, i, z, turn, joint, p, own):  # type: ignore[no-untyped-def]
-    """Write the state at the start of segment i, after a reset in which it begins; return its duration."""
-    count, n, reset = z.shape[0], z.shape[1] - 1, whole.resets[i] >= 0
-    base = i % count
-    end = z[base + 1, 0] if base + 1 < count else 0.0 if turn == 0.0 else z[0, 0] + turn
-    if reset:
-        apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
-    for j in range(n):
-        own.begin[j] = own.equations.behind[n, j] if reset else joint[1 + j]
-    return end - z[base, 0]
 
 
 @helper
@@ -322,8 +264,17 @@ def integrals_of(
         np.empty(count), np.empty((rows, *joints.shape)), np.empty((rows, len(which) + 1))
     )
     whole = Extreme(-1, 0, 1.0, orbit.as_whole().system.layout)
-    done = integrate(
-        *(system.functions(), system.layout, whole, tape, joints, orbit.vector, which, extra),
-        *(resolved_level(model), int(goes_on(model)), *found),
-    )
+    at = joints, orbit.vector, which, extra
+    engine = system.functions(), system.layout, whole, tape
+    if goes_on(model) and _carried(orbit, tape, engine, at, found):
+        return found
+    done = integrate(*engine, *at, resolved_level(model), int(goes_on(model)), *found)
     return found if done and math.isfinite(sum(found.values.tolist())) else None
+
+
+def _carried(orbit: Orbit, tape: Tape, engine: Any, at: Any, found: Integrals) -> bool:
+    """Carry the integrals along as states, where that is the way; tell whether they were found so."""
+    from contfric.orbit.carried import carried_by, carry
+
+    flow = carried_by(orbit.model, tape)
+    return flow is not None and bool(carry(*engine, flow.address, *at, *found))

@@ -16,10 +16,11 @@ from contfric.orbit.holds import NO_PIN
 
 @kernel(f8(FlowType, LayoutType, matrix, vector, blocks))
 def move_joints(functions, layout, z, p, out):  # type: ignore[no-untyped-def]
-    """Write dz/dp for all parameters, shape (N, m, parameters); return the largest component of F_p.
+    """Write dz/dp for all parameters, shape (N, m, parameters); return how fast joints move.
 
     The columns of F_p are right-hand sides of one elimination. The matrix is evaluated at the joints given.
-    It is infinite if the matrix is singular, or something is not finite.
+    The largest component of dz/dp is compared with 1 + that of z, times 1 + that of F_p. The quotient is
+    infinite if the matrix is singular, or something is not finite.
     """
     count, m = z.shape
     free = p.shape[0]
@@ -53,8 +54,12 @@ def move_joints(functions, layout, z, p, out):  # type: ignore[no-untyped-def]
     left, right = np.empty((m, m)), np.empty((m, m))
     if not finish(work, equations.close, np.empty((m, 0)), no_border, left, right):
         return np.inf
+    fastest, size = 0.0, 0.0
     for i in range(count):
         for j in range(m):
+            size = max(size, abs(z[i, j]))
             for k in range(free):
-                out[i, j, k] = -work.z[i, j, k]
-    return largest
+                value = -work.z[i, j, k]
+                out[i, j, k] = value
+                fastest = max(fastest, abs(value)) if math.isfinite(value) else np.inf
+    return fastest / ((1.0 + size) * (1.0 + largest))

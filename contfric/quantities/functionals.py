@@ -162,16 +162,15 @@ class Measuring:
     # ---------------------------------------------------------------------------- harmonics
 
     def _harmonic(self, asked: Functional) -> tuple[float, FloatArray]:
-        scale, d_period = 2.0 / self._period, self.motion.d_period
-        rate = 2.0 * math.pi * self._cycles(asked) / self._period
+        scale, rate = 2.0 / self._period, 2.0 * math.pi * self._cycles(asked) / self._period
         totals, slopes = self._compiled(asked, rate) or self._on_panels(asked)
         a, b = scale * totals[0], -scale * totals[1]
-        d_a = scale * slopes[0] - a / self._period * d_period
-        d_b = -scale * slopes[1] - b / self._period * d_period
         size = math.hypot(a, b)
-        if asked.kind == "amplitude":
-            return size, _over(a * d_a + b * d_b, size)
-        return math.atan2(b, a), _over(a * d_b - b * d_a, size**2)
+        if asked.kind == "phase":
+            turned = np.array((-b * scale, -a * scale)) @ slopes
+            return math.atan2(b, a), _over(turned, size**2)
+        grown = np.array((a * scale, -b * scale)) @ slopes
+        return size, _over(grown - size * size / self._period * self.motion.d_period, size)
 
     def _cycles(self, asked: Functional) -> int:
         """Return the number of waves of a harmonic in the period of the orbit.

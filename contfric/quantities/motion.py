@@ -274,7 +274,7 @@ class OrbitMotion:
             return np.asarray(-self.directions.joints[0, 0])
         return np.asarray(self.orbit.system.layout.turn * self.d_excitation)
 
-    @property
+    @cached_property
     def d_period(self) -> FloatArray:
         """How the period of the orbit moves, shape (D,)."""
         return self.d_turn * (2.0 if self.orbit.system.half else 1.0)

@@ -41,13 +41,16 @@ _NO_SIGN = 1e-12
 #: below anything that changes.
 _BESIDE = 1e-12
 
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(NODES)
-#: From the values at the nodes to the coefficients of the Legendre series.
-SERIES = (
-    (np.arange(NODES) + 0.5)[:, None]
-    * np.polynomial.legendre.legvander(POINTS, NODES - 1).T
-    * WEIGHTS
-)
+
+def gauss_rule(nodes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return points and weights of Gauss' formula, and the matrix from values to the Legendre series."""
+    points, weights = np.polynomial.legendre.leggauss(nodes)
+    values = np.polynomial.legendre.legvander(points, nodes - 1).T * weights
+    return points, weights, (np.arange(nodes) + 0.5)[:, None] * values
+
+
+#: Points and weights on a panel; from the values there to the coefficients of the Legendre series.
+POINTS, WEIGHTS, SERIES = gauss_rule(NODES)
 
 #: A function of time along segments, at nodes; the arguments of its kinks are noted.
 Function = Callable[[Place, FloatArray, Kinks], Dual]

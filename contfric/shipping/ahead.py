@@ -43,9 +43,10 @@ def every_kernel() -> dict[str, Kernel]:
     from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import FlowKind, kernels_of
     from contfric.models.unit import callers
+    from contfric.orbit.carried import KERNELS as CARRYING
 
     found = [kernel for kind in FlowKind for kernel in kernels_of(kind)]
-    found += [*CODED.values(), *CHATTERING.values(), *callers()]
+    found += [*CODED.values(), *CHATTERING.values(), *CARRYING.values(), *callers()]
     root = Path(__file__).parent.parent
     for file in package_files():
         if _MARK not in file.read_text(encoding="utf-8"):

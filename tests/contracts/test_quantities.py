@@ -53,6 +53,9 @@ def test_the_list_of_names_is_one() -> None:
         ("x_max.real", "a dot can only stand in a number"),
         ("mean(1/(x - x))", "has no finite value in segment 1"),
         (3, "a quantity is a name, an expression such as"),
+        ("max(x) > 1", "in 'max(x) > 1': a condition can only stand"),
+        ("2*mena(v)", "unknown function 'mena'; did you mean 'mean'?"),
+        ("floor(max(x))", "every jump needs a surface"),
     ],
 )
 def test_a_mistake_is_said(orbit: cf.Orbit, name: Any, words: str) -> None:

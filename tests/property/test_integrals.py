@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.orbit import carried
 from contfric.quantities.functionals import Measuring
 from contfric.quantities.inside import inside_of
 from contfric.quantities.registry import quantity_of
@@ -15,6 +17,8 @@ from contfric.quantities.registry import quantity_of
 #: Excited and autonomous, halves of symmetric orbits, resets, integrated; the last ones take longer.
 MODELS = ("coulomb", "impact", "popp", "belt", "thermostat", "relay-sliding", "gear-pair")
 MORE = ("stribeck", "lugre", "rocking-block", "normal-force", "two-blocks")
+#: Of these some mode is integrated.
+CARRIED = ("stribeck", "lugre", "pendulum")
 #: Of integrated flow with boundary layers derivatives are known to a few times its rounding, amplified.
 TOLERANCE = {"stribeck": 1e-9, "lugre": 1e-7, "normal-force": 1e-9}
 
@@ -44,6 +48,41 @@ def test_compiled_integrals_are_those_of_panels(name: str, monkeypatch: pytest.M
         assert gradient.value == pytest.approx(value, rel=tolerance, abs=tolerance), text
         for by, slope in panels.items():
             assert gradient[by] == pytest.approx(slope, rel=tolerance, abs=tolerance), (text, by)
+
+
+@pytest.mark.parametrize(
+    "name", ["stribeck", *(pytest.param(n, marks=pytest.mark.slow) for n in CARRIED[1:])]
+)
+def test_integrals_that_an_integrated_motion_carries_are_those_at_nodes(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    orbit, rng = cf.find_orbit(name), np.random.default_rng(hash_of(name))
+    states, carries = orbit.model.states, carried.carried_by
+    used: list[bool] = []
+
+    def seen(*given: Any) -> Any:
+        used.append(carries(*given) is not None)
+        return carries(*given)
+
+    for _ in range(3):
+        a, b, c = (str(each) for each in rng.choice(states, 3))
+        k, size = int(rng.integers(1, 4)), float(rng.uniform(0.2, 2.0))
+        for text in (f"mean({a}*{b} + {size}*sin({c} + t))", f"amplitude({a}*{b}, {k})"):
+            monkeypatch.setattr(carried, "carried_by", seen)
+            found = replace(orbit).gradient(text)
+            monkeypatch.setattr(carried, "carried_by", lambda *_: None)
+            nodes = replace(orbit).gradient(text)
+            tolerance = TOLERANCE.get(name, 1e-11)
+            assert found.value == pytest.approx(nodes.value, rel=tolerance, abs=tolerance), text
+            for by, slope in nodes.items():
+                assert found[by] == pytest.approx(slope, rel=tolerance, abs=tolerance), (text, by)
+    assert used
+    assert all(used)
+
+
+def hash_of(name: str) -> int:
+    """Return a number of a name that is the same in every process."""
+    return sum(map(ord, name))
 
 
 @pytest.mark.parametrize(
