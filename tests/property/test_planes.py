@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import plane_explore
+from contfric.atlas import follow, plane_explore
 
 
 def explored(params: dict[str, float], ranges: dict[str, tuple[float, float]]) -> cf.Plane:
@@ -55,3 +55,15 @@ def test_known_curves_of_random_planes(monkeypatch: pytest.MonkeyPatch) -> None:
         ranges = {"Omega": (omega - 0.15, omega + 0.1), "S": (0.02, offset)}
         known += same_as_traced_whole(monkeypatch, params, ranges)
     assert known > 10
+
+
+def test_whole_orbits_are_found_on_the_branches_of_their_halves() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+    branches = [b for b in diagram.branches if not (b.bridge or b.mirrored)]
+    assert any(b.system.half for b in branches) and not all(b.system.half for b in branches)
+    rng = np.random.default_rng(5)
+    for branch in branches:
+        for k in rng.integers(1, len(branch) - 1, 3):
+            there = branch[int(k)].as_whole()  # as motions near an event come
+            assert [b for b in branches if follow._passes(b, there)] == [branch]
