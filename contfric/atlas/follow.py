@@ -191,10 +191,10 @@ def _meeting(
     which ends at one of them: what was traced is not traced again.
     """
     for near in _next_to(state, orbit):
-        if any(on_branch(near, branch) for branch in asked):
+        if any(_passes(branch, near) for branch in asked):
             continue
         traced = (*state.branches, *state.elsewhere)
-        branch = next((b for b in traced if on_branch(near, b)), None)
+        branch = next((b for b in traced if _passes(b, near)), None)
         if branch is None:
             branch = whole_branch(near, state.settings)
             state.elsewhere.append(branch)
@@ -203,6 +203,11 @@ def _meeting(
             return branch, ends
         asked.append(branch)
     return None, []
+
+
+def _passes(branch: Branch, orbit: Orbit) -> bool:
+    """Tell whether a branch passes an orbit; a symmetric one, which comes whole, is followed on its half."""
+    return on_branch(orbit.as_half() if branch.system.half else orbit, branch)
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:

@@ -29,7 +29,7 @@ from contfric.curves.problem import Problem, problem_of
 from contfric.curves.ranges import box_of
 from contfric.curves.side import CurveSide
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.curves.trace import largest_step, start_of_curve, trace_curve_side
+from contfric.curves.trace import first_points, largest_step, start_of_curve, trace_curve_side
 from contfric.errors import (
     ConvergenceError,
     ParameterError,
@@ -48,6 +48,17 @@ KINDS = ("SN", "BP", "PD", "CS", "SS", "AS", "GS")
 _SEEDS = Seeds(values=8, states=2)
 #: A curve shorter than this (relative to the ranges) leaves its start in no direction.
 _NOWHERE = 1e-5
+#: Points of a curve by which it is told whether it is known: so many steps, which grow from the first, lead
+#: well away from where curves meet.
+_FIRST = 16
+#: Where a curve ends for no reason of its own.
+_BROKEN_OFF = {
+    CurveEndReason.STEP,
+    CurveEndReason.LOST,
+    CurveEndReason.POINTS,
+    CurveEndReason.BROKEN,
+    CurveEndReason.INTERRUPTED,
+}
 #: Distance from a physical limit (relative to the ranges) within which it cannot be told from what meets it.
 _AT_LIMIT = 1e-6
 #: A region smaller than this share of the plane gets no section of its own.
@@ -279,6 +290,8 @@ def _follow_starts(
     state: PlaneExploration, starts: list[Start], special: SpecialPoint | None
 ) -> None:
     """Trace a curve that leaves a point in one or two directions, unless it is known."""
+    if all(_begins_known(state, start) for start in starts[:2]):
+        return
     sides = []
     for problem, point, border in starts[:2]:
         side = trace_curve_side(problem, point, border, state.largest, MOST_POINTS)
@@ -301,6 +314,23 @@ def _follow_starts(
     there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
     first = CurveEnd(CurveEndReason.START, special=there)
     state.add(join_sides(None, sides[0], first), sides)
+
+
+def _begins_known(state: PlaneExploration, start: Start) -> bool:
+    """Tell by its first points whether a curve is one that is known, to its ends.
+
+    Most that leave the points of codimension two are: traced whole before they were asked they took ten times
+    as many points as all that was new. Where a known one breaks off another trace may get farther.
+    """
+    problem, point, border = start
+    side = first_points(problem, point, border, state.largest, _FIRST)
+    if side.tip.arc - side.points[0].arc <= _NOWHERE:
+        return False
+    on_the_way = side.end.reason is CurveEndReason.POINTS
+    known = is_known(problem, side.tip if on_the_way else _inner(side), state.curves)
+    return known is not None and not any(
+        end.reason in _BROKEN_OFF for end in state.curves[known].ends
+    )
 
 
 def _inner(side: CurveSide) -> Point:

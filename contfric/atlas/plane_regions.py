@@ -22,7 +22,6 @@ from contfric.curves.curve import Curve
 from contfric.curves.ranges import PlaneRanges
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.system import Itinerary
-from contfric.remember.journal import remembered
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
 CELLS = 400
@@ -30,6 +29,10 @@ CELLS = 400
 _LEAST = 12
 #: Points of a branch nearer than this to a wall (cells) may lie on its other side.
 _AWAY = 1.5
+
+
+#: Rows and columns of cells.
+Frame = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,6 @@ class Living:
         return self.itinerary, self.half
 
 
-@remembered()
 def regions_of(
     model: Model,
     vector: FloatArray,
@@ -73,27 +75,24 @@ def regions_of(
     sizes = np.bincount(numbers.ravel(), minlength=count + 1)
     kept = [k for k in range(1, count + 1) if sizes[k] >= _LEAST]
     kept.sort(key=lambda k: -sizes[k])
+    frames = ndimage.find_objects(numbers)
     cells = np.full(numbers.shape, -1, dtype=np.int64)
     for index, k in enumerate(kept):
-        cells[numbers == k] = index
+        frame = frames[k - 1]
+        cells[frame][numbers[frame] == k] = index
     depth = ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1]
     shown = [_short(section, max_periods) for section in sections]
     lives = _families(box, shown, cells, depth, len(kept))
+    touching = _Touching(passed)
     regions = []
-    for index in range(len(kept)):
-        mask = cells == index
-        at = np.unravel_index(int(np.argmax(np.where(mask, depth, -1.0))), mask.shape)
+    for index, k in enumerate(kept):
+        frame = frames[k - 1]
+        mask = cells[frame] == index
+        at = np.unravel_index(int(np.argmax(np.where(mask, depth[frame], -1.0))), mask.shape)
+        i, j = (int(place) + part.start for place, part in zip(at, frame, strict=True))
         sampled, families, disputed = lives[index]
-        regions.append(
-            Region(
-                _centre(box, int(at[0]), int(at[1])),
-                float(np.sum(mask) / mask.size),
-                _bounds(mask, passed),
-                families,
-                sampled,
-                disputed,
-            )
-        )
+        share, bounds = float(sizes[k] / cells.size), touching.curves(cells, index, frame)
+        regions.append(Region(_centre(box, i, j), share, bounds, families, sampled, disputed))
     return tuple(regions), cells
 
 
@@ -136,15 +135,29 @@ def _centre(box: PlaneRanges, i: int, j: int) -> dict[str, float]:
     return {name: float(value) for name, value in zip(box.names, at, strict=True)}
 
 
-def _bounds(
-    mask: NDArray[np.bool_], passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]
-) -> tuple[int, ...]:
-    """Return the curves whose cells touch a region."""
-    with held_back():
-        from scipy import ndimage
+class _Touching:
+    """Which curves touch a region.
 
-    rim = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask
-    return tuple(k for k, cells in enumerate(passed) if np.any(rim[cells]))
+    Parameters
+    ----------
+    passed : the cells that each curve passes
+    """
+
+    def __init__(self, passed: Sequence[tuple[NDArray[np.int64], NDArray[np.int64]]]) -> None:
+        rows, columns = zip(*passed, strict=True) if passed else ((), ())
+        self._cells = tuple(np.concatenate([np.empty(0, int), *part]) for part in (rows, columns))
+        self._curves = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
+
+    def curves(self, numbers: NDArray[np.int64], index: int, frame: Frame) -> tuple[int, ...]:
+        """Return the curves whose cells lie next to those of a region, all of them inside of a frame."""
+        with held_back():
+            from scipy import ndimage
+
+        wide = tuple(slice(max(0, part.start - 1), part.stop + 1) for part in frame)
+        mask = numbers[wide] == index
+        rim = np.zeros(numbers.shape, dtype=np.bool_)
+        rim[wide] = ndimage.binary_dilation(mask, np.ones((3, 3))) & ~mask
+        return tuple(np.unique(self._curves[rim[self._cells]]).tolist())
 
 
 def _families(

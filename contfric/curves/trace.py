@@ -201,6 +201,13 @@ def trace_curve_side(
     return side
 
 
+def first_points(
+    problem: Problem, start: Point, border: FloatArray, largest: float, count: int
+) -> CurveSide:
+    """Follow a curve for so many points at most, and not beyond a change of its signature."""
+    return _trace_piece(problem, start, border, largest, count, None, False)
+
+
 def _is_same(one: Problem, other: Problem) -> bool:
     """Tell whether two problems follow the same condition in the same itinerary."""
     return one.test == other.test and one.system.itinerary == other.system.itinerary

@@ -88,6 +88,8 @@ class Journal:
         try:
             _lock(self._file, path)
             self._end = self._read(_first_line(belongs_to))
+            #: Whether an earlier run has left results in it.
+            self.goes_on = len(self._places) > 0
         except BaseException:
             os.close(self._file)
             raise
@@ -238,26 +240,39 @@ def remembered(
             journal = _KEPT.get()
             if journal is None:
                 return function(*args, **kwargs)
-            bound = signature.bind(*args, **kwargs)
-            bound.apply_defaults()
-            inputs = Writer()
-            asked = {k: v for k, v in bound.arguments.items() if k not in without}
-            try:
-                key = digest_of(inputs.bytes_of([name, asked]))
-            except UnstorableError:
+
+            def question() -> tuple[bytes, Writer]:
+                bound = signature.bind(*args, **kwargs)
+                bound.apply_defaults()
+                inputs = Writer()
+                asked = {k: v for k, v in bound.arguments.items() if k not in without}
+                return digest_of(inputs.bytes_of([name, asked])), inputs
+
+            def compute() -> R:
                 return function(*args, **kwargs)
+
+            if slow and not journal.goes_on:
+                # most of these calls are not kept, and a digest of the arguments takes longer than they do
+                return _given(_computed(journal, question, compute, slow, finished))  # type: ignore[no-any-return]
+            try:
+                key, inputs = question()
+            except UnstorableError:
+                return compute()
             found = _looked_up(journal, key, inputs)
             if found is None:
-                found = _computed(
-                    journal, key, inputs, lambda: function(*args, **kwargs), slow, finished
-                )
-            if isinstance(found[0], Exception):
-                raise found[0]
-            return found[0]  # type: ignore[no-any-return]
+                found = _computed(journal, lambda: (key, inputs), compute, slow, finished)
+            return _given(found)  # type: ignore[no-any-return]
 
         return call
 
     return mark
+
+
+def _given(found: tuple[Any]) -> Any:
+    """Return a result, or raise the error that a computation has ended in."""
+    if isinstance(found[0], Exception):
+        raise found[0]
+    return found[0]
 
 
 def _looked_up(journal: Journal, key: bytes, inputs: Writer) -> tuple[Any] | None:
@@ -274,8 +289,7 @@ def _looked_up(journal: Journal, key: bytes, inputs: Writer) -> tuple[Any] | Non
 
 def _computed(
     journal: Journal,
-    key: bytes,
-    inputs: Writer,
+    question: Callable[[], tuple[bytes, Writer]],
     compute: Callable[[], Any],
     slow: float,
     finished: Callable[[Any], bool] | None,
@@ -291,6 +305,7 @@ def _computed(
     whole = finished is None or isinstance(result, Exception) or finished(result)
     if whole and took >= slow:
         with suppress(UnstorableError):
+            key, inputs = question()
             content = Writer(inputs.objects).bytes_of((result, tally() - before))
             if took >= _WORTH * len(content):
                 journal.put(key, content)
