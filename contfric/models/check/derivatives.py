@@ -171,7 +171,7 @@ def _shown(names: list[str], point: FloatArray) -> str:
 
 def _described(probe: Probe) -> list[Case]:
     model, description = probe.model, from_text(probe.model.definition)
-    exact, field = digits(description), field_of(model.definition)
+    exact, field = digits(description), field_of(model)
     split = _Split(model)
     fields = lru_cache(maxsize=_KEPT)(_Fields(split, exact))
     found = [_observable(split, exact, o.name, c) for c, o in enumerate(model.observables)]
