@@ -65,7 +65,7 @@ class Formulas:
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
-        found = []
+        found, moving = [], (self.t, *self.y)
         for mode, bits in itertools.product(self.description.modes, self.pieces):
             signs = {
                 observables[name]: bit
@@ -79,7 +79,7 @@ class Formulas:
                     signs[above] = side
             found.append(
                 [
-                    resolved(self.read(("modes", mode.name, "field", state), rate), signs)
+                    resolved(self.read(("modes", mode.name, "field", state), rate), signs, moving)
                     for state, rate in zip(self.description.states, mode.field, strict=True)
                 ]
             )
