@@ -17,7 +17,7 @@ _STILL = 1e-7
 _PLACES, _TRIES = 6, 60
 #: States at which motion enters a mode that holds on both sides of where it does: of 40, one of a class of a
 #: tenth is missed in one of 70 models. From how many random states these are sought.
-_ENTERED, _STARTS = 40, 600
+_ENTERED, _STARTS = 40, 400
 
 
 def departing_side(
@@ -66,15 +66,17 @@ def turned_modes(
             continue
         if (here.mode, *beyond.items()) in place:
             continue  # nothing happens there
+        verdicts = found.setdefault((there.mode, surface), set())
         others = {name: sign for name, sign in here.signs.items() if name != surface}
         met = (
-            at
-            for at in sampler.on(surface, others, _STARTS, _STARTS)
-            if side * sampler.rate(here.mode, surface, side, *at) < 0.0
+            point
+            for point in sampler.on(surface, others, _STARTS, _STARTS)
+            if side * sampler.rate(here.mode, surface, side, *point) < 0.0
         )
-        for t, y in itertools.islice(met, _ENTERED):
-            back = side * sampler.rate(there.mode, surface, side, t, y) > 0.0
-            found.setdefault((there.mode, surface), set()).add(back)
+        for t, y in itertools.islice(met, 0 if len(verdicts) == 2 else _ENTERED):
+            verdicts.add(side * sampler.rate(there.mode, surface, side, t, y) > 0.0)
+            if len(verdicts) == 2:
+                break
     always, at_times = (
         frozenset(pair for pair, verdicts in found.items() if verdicts == wanted)
         for wanted in ({True}, {True, False})
