@@ -32,6 +32,7 @@ from contfric.models.coded_flow import coded_flow
 if TYPE_CHECKING:
     from contfric.compiled import Kernel
     from contfric.flow.interface import CompiledFlow
+    from contfric.models.definition import Model
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,13 @@ def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
     return with_chatter(flow, len(modes), chatters)
 
 
-def field_of(definition: str) -> Any:
-    """Return the compiled field of the modes of a definition, without the flow, which takes longer."""
+def field_of(model: Model) -> Any:
+    """Return the compiled field of the modes of a model, without the flow, which takes longer.
+
+    It is that of the flow's own definition, without names and titles: another text is another module.
+    """
+    flow = model.flow_factory
+    definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
     found = coded_flow(definition)
     return load_module(definition).field_of if found is None else found.field
 

@@ -32,6 +32,7 @@ from contfric.models.definition import Model
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import defaults
+from contfric.models.formulas import vanishes
 from contfric.models.functions import as_text
 from contfric.models.sections import joined_modes
 from contfric.models.symbols import Formulas
@@ -164,7 +165,7 @@ class _Wall:
             raise self._refused("the rate of the gap does not depend on the states")
         along = [row[column] for row in changes]
         size = sum(slope * a for slope, a in zip(slopes, along, strict=True))
-        if sympy.simplify(size) == 0:
+        if vanishes(size):
             raise self._refused("the reset does not change the rate of the gap")
         direction = [sympy.simplify(a / size) for a in along]
         self.field = [
@@ -177,7 +178,7 @@ class _Wall:
 
     def check_same(self, other: _Wall) -> None:
         """Refuse flights on both sides whose contacts are not the same."""
-        if any(sympy.simplify(a - b) != 0 for a, b in zip(self.field, other.field, strict=True)):
+        if not all(vanishes(a - b) for a, b in zip(self.field, other.field, strict=True)):
             raise self._refused("at rest on it the fields of both sides do not agree")
 
     def _along(self, formula: Any, field: list[Any]) -> Any:

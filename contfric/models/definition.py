@@ -107,6 +107,8 @@ class Model(Shown, TransitionMaps):
     turned : frozenset of (str, str)
         (mode, surface): motion that enters the mode where it meets the surface turns back to the side that it
         came from, as a room does when its heater is switched off.
+    turned_at_times : frozenset of (str, str)
+        The same, where it turns back from some states and goes on from others.
     max_step : float or None
         Largest step of a continuation, as a share of the range, where the user gives none; None for that
         of the engine. For a model whose branches fold in less.
@@ -159,6 +161,7 @@ class Model(Shown, TransitionMaps):
     kinks: tuple[str, ...] = ()
     filippov: bool = False
     turned: frozenset[tuple[str, str]] = frozenset()
+    turned_at_times: frozenset[tuple[str, str]] = frozenset()
     max_step: float | None = None
     rounding: float = 1e-13
     displacement: str = ""

@@ -95,6 +95,7 @@ def model_from(description: Description) -> Model:
     asked = [s for s in surfaces if s.name not in ends]
     domains = join_domains(declared, joined_modes(description))
     surfaces = clear_surfaces(surfaces, domains)
+    always, at_times = turned_modes(sampler, surfaces, declared)
     model = Model(
         **as_described(description, sampler, surfaces),
         modes=tuple(_mode(description, m.name) for m in description.modes),
@@ -104,7 +105,8 @@ def model_from(description: Description) -> Model:
         chatters=description.chatters,
         kinks=description.kinks,
         filippov=leaves_at_rest(sampler, description, flights),
-        turned=turned_modes(sampler, surfaces, declared),
+        turned=always,
+        turned_at_times=at_times,
         phase=description.phase,
     )
     for domain, surface, modes in model.undecided():

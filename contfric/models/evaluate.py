@@ -179,11 +179,11 @@ class Sampler:
             yield draw.uniform(0.0, span), [draw.uniform(*ends) for ends in self.region]
 
     def on(
-        self, surface: str, sides: Mapping[str, int], most: int
+        self, surface: str, sides: Mapping[str, int], most: int, tries: int = _TRIES
     ) -> Iterator[tuple[float, list[float]]]:
         """Yield up to ``most`` times and states on a surface, on the given sides of others."""
         found = 0
-        for t, y in self.states(_TRIES):
+        for t, y in self.states(tries):
             landed = self.landed(surface, t, y)
             if landed is None or self.sides(*landed, sides) != dict(sides):
                 continue

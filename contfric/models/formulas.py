@@ -15,7 +15,9 @@ import ast
 import math
 import sys
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Any
+from zlib import crc32
 
 import sympy
 
@@ -26,6 +28,8 @@ from contfric.models.grammar import UNARY, Algebra, Scope
 _EXACT_POWER = 64
 #: The largest ordinary number.
 _LARGEST = sys.float_info.max
+#: Places at which a formula is evaluated before it is simplified; digits there, and what may be rounding.
+_TRIED, _DIGITS, _ROUNDING = 2, 30, 1e-15
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
@@ -156,33 +160,62 @@ def formula(tree: ast.expr, scope: Scope[Any]) -> Any:
     return found
 
 
-def resolved(expression: Any, signs: Mapping[Any, int]) -> Any:
+def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any]) -> Any:
     """Return a formula where the signs of some parts are known: kinks that a mode does not see.
+
+    What is a known part times a factor of parameters, ``s/phi - 1`` of ``s - phi``, has its sign times that
+    of the factor; what depends on such a sign is looked at for either.
 
     Parameters
     ----------
     signs : from a formula to its sign, +1 or -1
+    moving : the symbols that are no parameters
     """
+    moved = set(moving)
 
-    def side(x: Any) -> int:
-        for known, sign in signs.items():
-            ratio = sympy.cancel(x / known) if x.free_symbols == known.free_symbols else x
-            if ratio.is_number and ratio.is_real and ratio != 0:
-                return sign if ratio > 0 else -sign
-        return 0
+    def side(x: Any) -> Any:
+        if not x.free_symbols & moved:
+            return Sign(x)
+        either = next((w for w in x.atoms(Where) if not w.args[0].free_symbols & moved), None)
+        if either is not None:
+            up, down = (side(x.xreplace({either: part})) for part in either.args[1:])
+            return 0 if 0 in (up, down) else Where(either.args[0], up, down)
+        ratios = ((_factor(x, known, tuple(moving)), sign) for known, sign in signs.items())
+        return next((sign * Sign(ratio) for ratio, sign in ratios if ratio != 0), 0)
 
     swaps: dict[Any, Any] = {}
     for part in expression.atoms(Sign, Abs, Where):
-        s = side(part.args[0])
+        s = side(part.args[0]) if part.args[0].free_symbols & moved else 0
         if s == 0:
             continue
         if isinstance(part, Sign):
-            swaps[part] = sympy.Integer(s)
+            swaps[part] = s
         elif isinstance(part, Abs):
             swaps[part] = s * part.args[0]
         else:
-            swaps[part] = part.args[1] if s > 0 else part.args[2]
-    return resolved(expression.xreplace(swaps), signs) if swaps else expression
+            swaps[part] = Where(s, *part.args[1:])
+    return resolved(expression.xreplace(swaps), signs, moving) if swaps else expression
+
+
+@lru_cache(maxsize=4096)
+def _factor(x: Any, known: Any, moving: tuple[Any, ...]) -> Any:
+    """Return x over another formula if only parameters are in that, else 0: most differ at two places."""
+    if (x.free_symbols ^ known.free_symbols) & set(moving):
+        return sympy.Integer(0)
+    ratios = [_at(x, moving, shift) / _at(known, moving, shift) for shift in range(_TRIED)]
+    if all(r.is_Float for r in ratios) and max(ratios) - min(ratios) > _ROUNDING * abs(ratios[0]):
+        return sympy.Integer(0)
+    ratio = sympy.cancel(x / known)
+    return sympy.Integer(0) if ratio.free_symbols & set(moving) else ratio
+
+
+def _at(formula: Any, moving: Collection[Any], shift: int) -> Any:
+    """Return the value of a formula at numbers, the same for the same symbols; ``moving`` are shifted."""
+    numbers = {
+        s: sympy.Rational(crc32(str(s).encode()) % 97 + 13 * (1 + shift * (s in moving)), 31)
+        for s in formula.free_symbols
+    }
+    return sympy.N(formula.xreplace(numbers), _DIGITS)
 
 
 def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
@@ -205,3 +238,17 @@ def cannot_jump(expression: Any, moving: Collection[Any]) -> bool:
     whole = expression.is_Pow and expression.exp.is_Integer and expression.exp > 0
     known = whole or isinstance(expression, _CONTINUOUS)
     return known and all(cannot_jump(part, moving) for part in expression.args)
+
+
+def vanishes(expression: Any) -> bool:
+    """Tell whether a formula is 0 everywhere.
+
+    One that is not is not 0 at some numbers, most often the first ones, which takes a thousandth of the time.
+    """
+    if not expression.free_symbols:
+        return bool(sympy.simplify(expression) == 0)
+    for shift in range(_TRIED):
+        there = _at(expression, expression.free_symbols, shift)
+        if there.is_Float and abs(there) > _ROUNDING:
+            return False
+    return bool(sympy.simplify(expression) == 0)

@@ -12,11 +12,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import sympy
-
 from contfric.models.affine import AffineForm
 from contfric.models.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.description import Description
+from contfric.models.formulas import vanishes
 from contfric.models.linear_code import CoefficientLayout, LinearWriter, layout_of, places_of
 from contfric.models.motion import motion_code
 from contfric.models.symbols import Formulas, moves_in_closed_form
@@ -108,9 +107,7 @@ def _idle(description: Description, rates: list[list[Any]]) -> list[tuple[int, i
         (m, c)
         for m, mode in enumerate(description.modes)
         for c, every in enumerate(zip(*rates[m * pieces : (m + 1) * pieces], strict=True))
-        if all(
-            rate == 0 or (0 in mode.sides.values() and sympy.simplify(rate) == 0) for rate in every
-        )
+        if all(rate == 0 or (0 in mode.sides.values() and vanishes(rate)) for rate in every)
     ]
 
 

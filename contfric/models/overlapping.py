@@ -1,12 +1,16 @@
-"""Which mode follows where several hold behind a surface: the one in which the fewest switches change."""
+"""Which mode follows where several hold behind a surface: the one in which the fewest switches change.
+
+A mode that holds on both sides of the surface may be entered on either.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from contfric.models.parts import Domain
+    from contfric.models.transition_maps import TransitionMaps
 
 
 def nearest(
@@ -24,3 +28,10 @@ def nearest(
     own = {s: side for (m, s), side in side_of.items() if m == mode and side}
     kept = [sum(side_of[d.own_mode, s] == side for s, side in own.items()) for d in fits]
     return [d for d, count in zip(fits, kept, strict=True) if count == max(kept)]
+
+
+def turned_back(model: TransitionMaps, domain: str, surface: str, target: str) -> Iterator[str]:
+    """Yield the domain on this side of a surface in the mode that is entered there, if it may turn back."""
+    here, entered = model.domain_by_name[domain], model.domain_by_name[target].own_mode
+    if entered != here.own_mode and (entered, surface) in model.turned_at_times:
+        yield from (d.name for d in model.domains_of(entered) if d.signs == here.signs)

@@ -20,6 +20,7 @@ from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.grammar import parse
+from contfric.models.on_disk import derived
 from contfric.models.regions import domains_of, engine_order, is_possible
 
 #: Functions with kinks: what they are on either side of a surface only formulas tell.
@@ -57,10 +58,14 @@ class _Key:
 
 @lru_cache(maxsize=64)
 def _joined(key: _Key) -> dict[str, str]:
-    description = key.description
+    """Return what was joined: sought once, as formulas that look different take a while to tell apart."""
+    if len(key.description.modes) < 2:
+        return {mode.name: mode.name for mode in key.description.modes}
+    return derived("joined", key.motion, lambda: _sought(key.description))
+
+
+def _sought(description: Description) -> dict[str, str]:
     first = {mode.name: mode.name for mode in description.modes}
-    if len(first) < 2:
-        return first
     surfaces = engine_order(description)
     domains = domains_of(description, surfaces)
     if len({tuple(d.signs.items()) for d in domains}) < len(domains):

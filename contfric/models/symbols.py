@@ -65,7 +65,7 @@ class Formulas:
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
-        found = []
+        found, moving = [], (self.t, *self.y)
         for mode, bits in itertools.product(self.description.modes, self.pieces):
             signs = {
                 observables[name]: bit
@@ -79,7 +79,7 @@ class Formulas:
                     signs[above] = side
             found.append(
                 [
-                    resolved(self.read(("modes", mode.name, "field", state), rate), signs)
+                    resolved(self.read(("modes", mode.name, "field", state), rate), signs, moving)
                     for state, rate in zip(self.description.states, mode.field, strict=True)
                 ]
             )
@@ -156,13 +156,30 @@ class Formulas:
         ]
 
     def positive(self) -> list[int]:
-        """Return the states that are never negative: their range begins at 0."""
+        """Return the states that are never negative, and may become as small as they like.
+
+        Their range begins at 0, and in some mode they stay 0 where they are 0 together, as the infected and
+        the infectious do. A state that is driven away from 0 (a speed, the current of a coil) is not small
+        for long, and no share of it is known where it begins at 0.
+        """
         states, ranges = self.description.states, self.description.ranges
         lowest = [
             self.read(("spread", state), ends[0]) if ends else None
             for state, ends in zip(states, ranges or ((),) * len(states), strict=True)
         ]
-        return [k for k, low in enumerate(lowest) if low is not None and low == 0]
+        from_0 = {k for k, low in enumerate(lowest) if low is not None and low == 0}
+        if not from_0:
+            return []
+        return sorted(set().union(*(self._kept(from_0, field) for field in self.fields())))
+
+    def _kept(self, kept: set[int], field: list[Any]) -> set[int]:
+        """Return those of some states that stay 0 in a field where they are 0 together, and else move."""
+        while True:
+            none = {self.y[k]: sympy.Integer(0) for k in kept}
+            left = {k for k in kept if field[k].subs(none) == 0}
+            if left == kept:
+                return {k for k in kept if field[k] != 0}
+            kept = left
 
     def resets(self) -> list[list[Any]]:
         """Return the map of the state at each surface."""

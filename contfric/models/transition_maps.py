@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.overlapping import nearest
+from contfric.models.overlapping import nearest, turned_back
 from contfric.models.parts import across, led
 from contfric.models.section_maps import SectionMaps
 
@@ -37,6 +37,7 @@ class TransitionMaps(SectionMaps):
         symmetry: Symmetry | None
         kinks: tuple[str, ...]
         turned: frozenset[tuple[str, str]]
+        turned_at_times: frozenset[tuple[str, str]]
         chatters: tuple[Chatter, ...]
 
     @property
@@ -140,9 +141,10 @@ class TransitionMaps(SectionMaps):
 
     @cached_property
     def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
-        """Every domain that can follow each (domain, surface): one, but for a reset."""
+        """Every domain that can follow each (domain, surface): one, but for a reset, or where it turns."""
         found: dict[tuple[str, str], tuple[str, ...]] = {
-            key: (target,) for key, target in self.transitions.items()
+            key: (target, *turned_back(self, *key, target))
+            for key, target in self.transitions.items()
         }
         for domain in self.domains:
             for reset in self.resets:

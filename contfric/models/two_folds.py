@@ -32,13 +32,13 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import sympy
 
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, FloatArray, Model
 from contfric.models.description import Description
+from contfric.models.formulas import vanishes
 from contfric.models.numbers import function_of_numbers
 from contfric.models.symbols import Formulas
 from contfric.models.tied import tied
@@ -227,7 +227,7 @@ class _Tangencies:
             function_of_numbers(args, equations),
             function_of_numbers(args, [[e.diff(u) for u in unknowns] for e in equations]),
             function_of_numbers(args, second),
-            sympy.simplify(rates[0] - rates[1]) == 0,
+            vanishes(rates[0] - rates[1]),
         )
 
     def jacobian(self, z: FloatArray) -> FloatArray:

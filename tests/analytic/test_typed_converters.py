@@ -6,6 +6,8 @@ The references are matrix exponentials from tick to tick.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,3 +151,42 @@ def test_a_boost_converter_in_seconds_goes_on_where_its_current_dies(tmp_path) -
 
     (border,) = [b for b in diagram.bifurcations if b.kind is cf.Kind.CS]
     assert border.params["R"] == pytest.approx(brentq(current_at_tick, 5.0, 60.0), abs=1e-8)
+
+
+@pytest.mark.parametrize(("n", "m"), [(9, 0.8), (4, 0.9)])
+def test_a_sine_against_a_triangle(tmp_path, n: int, m: float) -> None:
+    """A carrier as a state: switches are where the sine meets the triangle, the current is that of them.
+
+    The page's inverter has nine pulses; with an even number it has no symmetry.
+    """
+    page = (Path(__file__).parents[2] / "docs/models.md").read_text(encoding="utf-8")
+    text = "name: inverter" + page.split("name: inverter")[1].split("```")[0]
+    text = text.replace("9*w", f"{n}*w")
+    if n % 2 == 0:
+        text = text.replace("symmetry: i -> -i, z -> -z, t -> t + T/2", "")
+    model = typed(tmp_path, text)
+
+    def apart(t: float) -> float:
+        return m * math.sin(t) - 2.0 / math.pi * math.asin(math.sin(n * t))
+
+    grid = np.linspace(0.0, 2.0 * math.pi, 4001) + 1e-9
+    switches = [
+        brentq(apart, a, b, xtol=1e-15) for a, b in pairwise(grid) if apart(a) * apart(b) < 0.0
+    ]
+
+    def moved(i: float) -> float:
+        for a, b in pairwise([0.0, *switches, 2.0 * math.pi]):
+            limit = math.copysign(10.0, apart((a + b) / 2.0))
+            i = limit + (i - limit) * math.exp(a - b)
+        return i
+
+    start = moved(0.0) / (1.0 - math.exp(-2.0 * math.pi))
+    orbit = cf.find_orbit(model, {"m": m})
+    assert orbit.periods == 1
+    assert abs(orbit.multipliers[0]) == pytest.approx(math.exp(-2.0 * math.pi), rel=1e-9)
+    motion = cf.simulate(model, {"m": m}, state=[start, 0.0], periods=1)
+    assert motion.last[2] == pytest.approx([start, 0.0], abs=1e-11)
+    inside = (1e-6, 2.0 * math.pi - 1e-6)  # they meet at the ends, too
+    met = [t for t, (_, s) in zip(motion.times, motion.itinerary, strict=True) if s == "switch"]
+    met, switches = ([t for t in ts if inside[0] < t < inside[1]] for ts in (met, switches))
+    assert met == pytest.approx(switches, abs=1e-11)

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from contfric.base.resources import bundled_dir
-from contfric.models import build, files
+from contfric.models import build, files, sections
 from contfric.models.describe import describe
 from contfric.models.library import bundled, find
 
@@ -97,3 +97,26 @@ def test_a_tolerance_reaches_the_flow_of_the_same_code():
         build.load_module(definition).functions(tolerance)._numbers() for tolerance in (1e-12, 1e-9)
     ]
     assert [b["relative"] for b in blocks] == [b["absolute"] for b in blocks] == [1e-12, 1e-9]
+
+
+@pytest.mark.parametrize("name", ["popp", "relay-sliding", "belt"])
+def test_a_model_has_one_module(fresh_cache, name):
+    """Its fields are asked for before its flow is: by starts and by `check`, as the module of the flow."""
+    model = read(name)
+    flow = model.flow_factory
+    assert flow.definition != model.definition
+    assert build.field_of(model) is build.load_module(flow.definition).field_of
+    assert len(list(fresh_cache.rglob("contfric_model_*.py"))) == 1
+
+
+def test_modes_are_joined_once(fresh_cache, monkeypatch):
+    """Formulas that look different are told apart by sympy, which is as slow to load as all else together."""
+    data = yaml.safe_load((bundled_dir("models") / "popp.yaml").read_text(encoding="utf-8"))
+    description = describe(data)
+    sections._joined.cache_clear()
+    first = sections.joined_modes(description)
+    assert len(set(first.values())) < len(first)
+    sections._joined.cache_clear()
+    monkeypatch.setattr(sections, "_sought", None)
+    assert sections.joined_modes(description) == first
+    sections._joined.cache_clear()

@@ -80,7 +80,7 @@ MISTAKES = [
     ),
     ("2*pi/Omega", "3*pi/Omega", Topic.PERIOD, "error", "common period"),
     ("Omega > 0]", "Omega > 1]", Topic.CONSTRAINTS, "error", "violate Omega > 1 (Omega = 0.7)"),
-    ("S*sign(v)", "S*sign(v/k)", Topic.KINKS, "warning", "kink where v/k = 0"),
+    ("S*sign(v)", "S*sign(v)*(1 - k + abs(abs(v) - k))", Topic.KINKS, "warning", "kink where -k "),
     ("k: 1.0}", "k: 1.0, mu: 0.3}", Topic.NAMES, "warning", "parameter 'mu' is used nowhere"),
     ("  backward: {in: {v: -}}\n", "", Topic.TRANSITIONS, "error", "and no domain follows"),
     (

@@ -40,6 +40,10 @@ WORDS = {
         *(("may_stop", "hot"), ("may_start", "cold")),
     },
     "latch": {("on", "trip"), ("off", "tick")},
+    "inverter": {
+        *(("plus_up", "switch"), ("minus_up", "kink")),
+        *(("minus_down", "switch"), ("plus_down", "kink")),
+    },
     "sampled": {("on", "tick"), ("off", "tick")},
     "knob": {("turns", "phi+")},
     "theta": {("turns-", "spike"), ("turns+", "th+")},

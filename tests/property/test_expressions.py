@@ -17,9 +17,10 @@ from contfric.models.build import load_module
 from contfric.models.check.digits import MANY_DIGITS, slopes
 from contfric.models.code import printed
 from contfric.models.describe import describe
-from contfric.models.formulas import FORMULAS, formula
+from contfric.models.formulas import FORMULAS, formula, kinks_in, vanishes
 from contfric.models.grammar import FLOATS, Scope, names_in, number_of, parse
 from contfric.models.oscillator import Symbols
+from contfric.models.symbols import Formulas
 
 NAMES = ("x", "v", "t", "a", "b")
 
@@ -241,3 +242,63 @@ def test_symbols_say_what_they_have() -> None:
     assert (y.x, y["v"], list(y)) == (1, 2, [1, 2])
     with pytest.raises(ModelError, match=r"did you mean 'v'"):
         _ = y.vw
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_what_vanishes_is_told(seed: int) -> None:
+    """Products written out, and sums of angles: they vanish less themselves, and not by a millionth."""
+    rng = random.Random(seed)
+    x, y, z = sympy.symbols("s0 s1 p0")
+    a, b = (rng.choice((x, y, z, x * y, y - z)) for _ in range(2))
+    k = sympy.Rational(rng.randint(-9, 9), rng.randint(1, 9))
+    same = (
+        sympy.expand((a + k * b) ** 3) - (a + k * b) ** 3,
+        sympy.sin(a + b) - sympy.sin(a) * sympy.cos(b) - sympy.cos(a) * sympy.sin(b),
+        sympy.sqrt(x**2 + 1) ** 4 - (x**2 + 1) ** 2,
+        (a**2 - b**2) / (x + 3) - (a - b) * (a + b) / (x + 3),
+    )
+    assert all(vanishes(e) for e in same)
+    assert not any(vanishes(e + sympy.Rational(1, 10**6) * rng.choice((x, y, z, 1))) for e in same)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_factor_of_parameters_hides_no_kink(seed: int) -> None:
+    """``sat(q*h)`` between surfaces h = 1/q and -1/q, q of parameters, of either sign, in all modes."""
+    rng = random.Random(seed)
+    factor, level = rng.choice([("1/a", "a"), ("b/a", "a/b"), ("2*b", "1/(2*b)"), ("-1/a", "-a")])
+    h = rng.choice(["x - c*sin(t)", "v + c*x", "x*v - c"])
+    sat = rng.choice([f"min(1, max(-1, ({h})*({factor})))", f"max(-1, min(1, ({factor})*({h})))"])
+    negative = factor.startswith("-")
+    data = {
+        "name": "saturated",
+        "states": ["x", "v"],
+        "parameters": {"a": -0.4 if negative else 0.4, "b": 1.3, "c": 0.7},
+        "period": "2*pi",
+        "surfaces": {
+            "up": {"observable": h, "level": level},
+            "low": {"observable": h, "level": f"-({level})"},
+        },
+        "field": {"x": "v", "v": f"-x - {sat} - abs(c*({h} - ({level})))/c"},
+        "modes": {
+            "above": {"in": {"up": "+"}},
+            "within": {"in": {"up": "-", "low": "+"}},
+            "below": {"in": {"low": "-"}},
+        },
+    }
+    description = describe(data)
+    formulas = Formulas(description)
+    moving = (formulas.t, *formulas.y)
+    assert not any(kinks_in(f, moving) for field in formulas.fields() for f in field)
+    module, values = load_module(description.motion), [p.default for p in description.parameters]
+    surfaces = {s.name: s for s in description.surfaces}
+    for _ in range(20):
+        t, y = rng.uniform(0, 6), np.array([rng.uniform(-2, 2), rng.uniform(-2, 2)])
+        named = dict(zip(("t", "x", "v", "a", "b", "c"), (t, *y, *values), strict=True))
+        scope = Scope(FLOATS, named, {})
+        height = scope.evaluate(parse(h))
+        sides = {n: height > scope.evaluate(parse(s.level)) for n, s in surfaces.items()}
+        mode = 0 if sides["up"] else 1 if sides["low"] else 2
+        names = [m.name for m in description.modes]
+        k, out = names.index(("above", "within", "below")[mode]), np.empty(2)
+        module.field_of(k, t, y, np.array(values), EVERY[:0], out, np.empty((0, 0)))
+        assert out[1] == pytest.approx(scope.evaluate(parse(data["field"]["v"])), abs=1e-12)

@@ -292,7 +292,7 @@ class _Described(_Cases):
         return lambda point: [self.exact.value(text, self._at(point)[0])]
 
     def field(self, m: int, mode: str) -> list[Case]:
-        compiled = self.vector(field_of(self.model.definition), m)
+        compiled = self.vector(field_of(self.model), m)
         return [Case(f"field of mode '{mode}'", compiled, lambda x: self._field_at(mode, *x), mode)]
 
     def reset(self, k: int, surface: str) -> list[Case]:

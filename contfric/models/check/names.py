@@ -105,9 +105,8 @@ def check_kinks(report: ModelReport, model: Model) -> None:
                 report.warn(
                     Topic.KINKS,
                     f"the rate of '{state}' in mode '{mode.name}' has a kink where {text} = 0, which no "
-                    "side of the mode decides: add a surface there and a mode on each side (a factor "
-                    "is best written outside: abs(v)/vS in place of abs(v/vS)); without it the kink "
-                    "costs accuracy",
+                    "side of the mode decides: add a surface there and a mode on each side; without "
+                    "it the kink costs accuracy",
                 )
 
 

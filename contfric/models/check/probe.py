@@ -88,7 +88,7 @@ class Probe:
         """Return the rates of all states in a mode."""
         n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
-            out, field = np.empty(n), field_of(self.model.definition)
+            out, field = np.empty(n), field_of(self.model)
             m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
             field(m, t, y, self.vector, none, out, np.empty((0, 0)))
             return out
