@@ -106,14 +106,15 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
     Where a slip shrinks to nothing, of duration d, its ends are reached at rates of order d and d^2: times
     of events, and with them multipliers, are known to the rounding over the product of these rates, while
     the orbit is known well. What changes smoothly changes in proportion to the step, or like its root at an
-    end; rounding is as large between two points however near they are.
+    end; rounding is as large between two points however near they are. It is the sign that is asked for:
+    where an exit has no rate a multiplier is infinite with one sign, and only its size is rounding.
     """
     step = after.arc - before.arc
     # next to an exit without a rate a multiplier has a pole, to which no point is told nearer than this
     small = min(_NUDGE * step, 0.01 * SAME_LOCATION)
     if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
         return False
-    over_step = abs(float(after.tests[index] - before.tests[index]))
+    over_step = abs(_bounded(after.tests[index]) - _bounded(before.tests[index]))
     return any(
         _change_next_to(orbit, point, shift, index, settings) > _ERRATIC * over_step
         for point, shift in ((before, small), (after, -small))
@@ -123,12 +124,17 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
 def _change_next_to(
     orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
 ) -> float:
-    """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
+    """Return by how much a bounded test changes over a shift; 0 where no orbit is found there."""
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = point.value + shift * point.slope
     moved = Orbit(orbit.system, point.joints + shift * point.tangent, vector, np.inf)
     near = first_point(moved, settings, point.tangent, point.slope)
-    return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
+    return 0.0 if near is None else abs(_bounded(near.tests[index]) - _bounded(point.tests[index]))
+
+
+def _bounded(value: float) -> float:
+    """Return a value between -1 and 1 in the place of one that may be infinite, in the same order."""
+    return float(value / (1.0 + abs(value)))
 
 
 def _at_multiplier(
