@@ -5,6 +5,7 @@ The scenes are those of the stress run (``benchmarks/stress/restarts.py``), by s
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,10 +15,13 @@ import restarts
 from report import Tally
 
 import contfric as cf
+from contfric.atlas.balance import _solved_at
+from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
+from contfric.continuation.points import settings_of
 from contfric.continuation.report import ROUGH
 
 #: Scenes by what was wrong with them.
@@ -232,6 +236,52 @@ def test_a_bridge_reaches_the_limit_at_which_it_turns_in_any_step() -> None:
                 assert again.values.min() < 1e-7, (limit, step)
                 reached += 1
     assert reached > 25
+
+
+def test_bridges_have_their_doublings_when_copies_are_raised() -> None:
+    """A bridge that was traced with one copy has none, and only a restart with more of them found any."""
+    rng, found, ends = np.random.default_rng(4), 0, (0.458, 0.519)
+    for friction in rng.uniform(0.2037, 0.2049, 2):
+        params = {"Omega": 0.4885, "S": float(friction), "S0": 0.31744, "zeta": -0.008924}
+        orbit = cf.find_orbit("coulomb", params)
+        asked = settings_of(orbit, "Omega", ends, None, True, 20_000)
+        state = Exploration(replace(asked, copies=1), 2, 1, 3000, True, None)
+        one = cf.explore(orbit, "Omega", ends, max_periods=2, copies=1)
+        for branch in one.branches:
+            if not branch.mirrored:
+                state.add(branch)
+        assert not any(event.bifurcation.kind is cf.Kind.PD for event in state.events)
+        state.raise_copies(2)
+        raised = [e for e in state.events if e.bifurcation.kind is cf.Kind.PD]
+        assert all(event in state.waiting for event in raised)
+        met = {e.bifurcation.params["Omega"] for e in raised}
+        both = cf.explore(orbit, "Omega", ends, max_periods=2, copies=2).bifurcations
+        for b in (b for b in both if b.kind is cf.Kind.PD and b.orbit.periods == 1):
+            assert min(abs(b.params["Omega"] - value) for value in met) < 1e-10
+            found += 1
+    assert found >= 2
+
+
+def test_orbits_between_two_points_are_as_far_along_as_is_asked() -> None:
+    """Solved normal to a chord in the product of a narrow branch, they were up to half a step elsewhere."""
+    rng, solved = np.random.default_rng(8), 0
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+    width = diagram.range[1] - diagram.range[0]
+    for branch in (b for b in diagram.branches if not b.mirrored):
+        arcs = branch.nodes[0]
+        for k in rng.integers(1, len(arcs), 12):
+            step, share = arcs[k] - arcs[k - 1], float(rng.uniform(0.2, 0.8))
+            if step < 1e-6:
+                continue
+            before = branch.between(float(arcs[k - 1]))
+            there = _solved_at(branch, float(arcs[k - 1] + share * step), width)
+            assert there is not None
+            off = (there.params["Omega"] - before.params["Omega"]) / width
+            moved = np.sqrt(np.mean(np.sum((there.joints - before.joints) ** 2, axis=1)) + off**2)
+            assert abs(moved - share * step) < 1e-3 * step, (branch.name, k, share)
+            solved += 1
+    assert solved > 40
 
 
 def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> None:
