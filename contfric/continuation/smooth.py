@@ -19,7 +19,12 @@ from contfric.continuation.folds import (
     not_located,
 )
 from contfric.continuation.locate_change import locate_change, locate_label
-from contfric.continuation.near_sliding_events import NO_LENGTH, SAME_LOCATION, last_told
+from contfric.continuation.near_sliding_events import (
+    NO_LENGTH,
+    SAME_LOCATION,
+    first_told,
+    last_told,
+)
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.side import first_point
@@ -51,7 +56,12 @@ def smooth_events(
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     # events after a sliding one do not happen
     after = last_told(orbit, before, after, beyond, settings) or after
-    values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
+    told = first_told(orbit, before, after, settings)
+    values = zip(
+        [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()],
+        after.tests[base:].tolist(),
+        strict=True,
+    )
     found: list[Located] = []
     folded = False
     for column, (a, b) in zip((FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR), values, strict=True):
@@ -59,7 +69,7 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        if column != FOLD and _is_rounding(orbit, before, after, base + column, settings):
+        if column != FOLD and _is_rounding(orbit, told, after, base + column, settings):
             continue
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         may_cross = column == CHI_ONE and orbit.model.symmetry is None
@@ -68,7 +78,8 @@ def smooth_events(
             if crossing is not None:
                 found.append(crossing)
                 continue
-        point = locate_change(orbit, before, after, settings, BY_TEST, base + column)
+        first = before if column == FOLD else told
+        point = locate_change(orbit, first, after, settings, BY_TEST, base + column)
         lost = point is None or point.lost
         if point is not None and (lost or _is_pole(point.tests[base + column], a, b)):
             point = None
@@ -106,15 +117,14 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
     Where a slip shrinks to nothing, of duration d, its ends are reached at rates of order d and d^2: times
     of events, and with them multipliers, are known to the rounding over the product of these rates, while
     the orbit is known well. What changes smoothly changes in proportion to the step, or like its root at an
-    end; rounding is as large between two points however near they are. It is the sign that is asked for:
-    where an exit has no rate a multiplier is infinite with one sign, and only its size is rounding.
+    end; rounding is as large between two points however near they are.
     """
     step = after.arc - before.arc
     # next to an exit without a rate a multiplier has a pole, to which no point is told nearer than this
     small = min(_NUDGE * step, 0.01 * SAME_LOCATION)
     if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
         return False
-    over_step = abs(_bounded(after.tests[index]) - _bounded(before.tests[index]))
+    over_step = abs(float(after.tests[index] - before.tests[index]))
     return any(
         _change_next_to(orbit, point, shift, index, settings) > _ERRATIC * over_step
         for point, shift in ((before, small), (after, -small))
@@ -124,17 +134,12 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
 def _change_next_to(
     orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
 ) -> float:
-    """Return by how much a bounded test changes over a shift; 0 where no orbit is found there."""
+    """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = point.value + shift * point.slope
     moved = Orbit(orbit.system, point.joints + shift * point.tangent, vector, np.inf)
     near = first_point(moved, settings, point.tangent, point.slope)
-    return 0.0 if near is None else abs(_bounded(near.tests[index]) - _bounded(point.tests[index]))
-
-
-def _bounded(value: float) -> float:
-    """Return a value between -1 and 1 in the place of one that may be infinite, in the same order."""
-    return float(value / (1.0 + abs(value)))
+    return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
 
 
 def _at_multiplier(

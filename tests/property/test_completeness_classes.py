@@ -238,6 +238,23 @@ def test_a_bridge_reaches_the_limit_at_which_it_turns_in_any_step() -> None:
     assert reached > 25
 
 
+def test_a_doubling_next_to_an_infinite_multiplier_is_found_from_either_side() -> None:
+    """It passes -1 at 4e-5 from the AS at which it is infinite: nobody saw it in a first step from there."""
+    rng, low, high = np.random.default_rng(6), 0.26070, 0.26081
+    params = {"Omega": 0.10142708114, "S": 0.168751473, "h": 0.45396473416, "zeta": 0.00810911}
+    for share in rng.uniform(-1e-5, 1e-5, 3):
+        here = {**params, "S0": 0.26075, "S": params["S"] * (1.0 + float(share))}
+        diagram = cf.explore(cf.find_orbit("coulomb", here, longest=1000), "S0", (low, high))
+        bridge = next(b for b in diagram.branches if b.bridge)
+        again = cf.explore(bridge[len(bridge) // 2], "S0", (low, high))
+        found = [
+            [b.params["S0"] for b in d.bifurcations if b.kind is cf.Kind.PD]
+            for d in (diagram, again)
+        ]
+        assert len(found[0]) == len(found[1]) == 1, share
+        assert abs(found[0][0] - found[1][0]) < 1e-11, share
+
+
 def test_bridges_have_their_doublings_when_copies_are_raised() -> None:
     """A bridge that was traced with one copy has none, and only a restart with more of them found any."""
     rng, found, ends = np.random.default_rng(4), 0, (0.458, 0.519)
