@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -248,13 +248,14 @@ def _families(
     diagram: Diagram, node: Node, value: float, slack: float
 ) -> Iterator[tuple[int, Orbit]]:
     """Yield (side, orbit) for each half-branch that meets an event."""
+    width = diagram.range[1] - diagram.range[0]
     for i in node.branches:
         branch = diagram.branches[i]
         if is_continuum(branch):
             continue
-        for position, event in _positions(diagram, node, branch):
+        for position, _ in _positions(diagram, node, branch):
             for way in (-1, 1):
-                found = _beside(branch, position, event, way, value, slack)
+                found = _beside(branch, position, way, value, slack, width)
                 if found is not None:
                     yield found
 
@@ -278,7 +279,12 @@ def _position(branch: Branch, event: Bifurcation) -> float:
 
 
 def _beside(
-    branch: Branch, position: float, event: Bifurcation, way: int, value: float, slack: float
+    branch: Branch,
+    position: float,
+    way: int,
+    value: float,
+    slack: float,
+    width: float,
 ) -> tuple[int, Orbit] | None:
     """Return an orbit of a branch on one side of an event, before the branch meets the next one."""
     others = [(_position(branch, e), e) for e in branch.bifurcations if e.kind is not Kind.T]
@@ -296,15 +302,19 @@ def _beside(
     # in the middle of what is beyond the slack, where the parameter goes on to the next event
     ahead_by = abs(following.params[branch.parameter] - value)
     share = 0.5 * (1.0 + slack / ahead_by) if ahead_by > slack else 0.5
-    solved = _solved_at(branch, position + share * (reach - position))
+    solved = _solved_at(branch, position + share * (reach - position), width)
     if solved is None:
         return None
     gap = solved.params[branch.parameter] - value
     return (int(np.sign(gap)), solved) if abs(gap) > slack else None
 
 
-def _solved_at(branch: Branch, arc: float) -> Orbit | None:
-    """Return the orbit at a location of a branch: solved normal to the chord, for a fold may be near."""
+def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
+    """Return the orbit at a location of a branch: solved normal to the chord, for a fold may be near.
+
+    Normal in the product in which its arclength is measured, that of the whole range: in that of a narrow
+    branch the parameter is all, and along the chord of a sharp bend it says nothing of the arclength.
+    """
     arcs, values, _ = branch.nodes
     k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
     length = float(arcs[k] - arcs[k - 1])
@@ -312,6 +322,7 @@ def _solved_at(branch: Branch, arc: float) -> Orbit | None:
         return None
     one, guess, other = (branch.between(float(a)) for a in (arcs[k - 1], arc, arcs[k]))
     settings = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
+    settings = replace(settings, width=width)
     chord = (other.joints - one.joints) / length
     point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)

@@ -26,6 +26,7 @@ from contfric.continuation.events import (
     Kind,
     Proposal,
 )
+from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
 
@@ -95,13 +96,29 @@ class Exploration:
         """Try more copies at events from now on, those that were followed already among them."""
         if copies <= self.copies:
             return
-        self.copies = copies
+        before, self.copies = self.copies, copies
         self.notes.append(f"copies raised to {copies}: a branch arrives with that many")
         waiting = {id(event) for event in self.waiting}
         for event in self.events:
             if _combines(event.bifurcation) and id(event) not in waiting:
                 event.proposals.clear()
                 self.waiting.append(event)
+        self.settings = replace(self.settings, copies=copies)
+        if before == 1:
+            self._find_doublings()
+
+    def _find_doublings(self) -> None:
+        """Let the bridges that were traced with one copy have their doublings, which nobody had asked for."""
+        self.elsewhere = [self._doubled(branch) for branch in self.elsewhere]
+        for index, branch in enumerate(self.branches):
+            opened = self.branches[index] = self._doubled(branch)
+            for bifurcation in opened.bifurcations:
+                if not any(bifurcation is b for b in branch.bifurcations):
+                    self._meet(bifurcation, index)
+
+    def _doubled(self, branch: Branch) -> Branch:
+        """Return a bridge with its doublings; branch points of symmetric ones are found with any copies."""
+        return branch if branch.system.half else with_openings(branch, self.settings)
 
     def judge(
         self,

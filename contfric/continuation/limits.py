@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contfric.continuation.events import End, EndReason
+from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.locate_change import locate_value
 from contfric.continuation.points import Point, Settings
 from contfric.orbit.orbit import Orbit
@@ -27,6 +27,39 @@ def is_at_limit(value: float, settings: Settings) -> bool:
         (settings.low_reason and value - settings.low < near)
         or (settings.high_reason and settings.high - value < near)
     )
+
+
+def ends_at_limit(
+    located: list[tuple[Bifurcation, Point]], before: Point, after: Point, settings: Settings
+) -> bool | None:
+    """Tell whether a branch that cannot go on ends at a physical limit; None if a shorter step is to tell.
+
+    At a limit the equations may be singular (without friction and damping orbits of a resonant period are a
+    continuum), and a branch that turns just there comes back along a parabola, on which its conditions fail.
+    An event may be located there, outside by rounding, or not at all. The slope is linear over a short step:
+    the value at its zero is so told from either point, and has to be at the limit from both. A vertex that
+    is no nearer to the limit than the points are is another one.
+    """
+    step, (a, b) = after.arc - before.arc, (before.slope, after.slope)
+    upper = a > 0.0
+    event = located[0] if located else None
+    if not (settings.high_reason if upper else settings.low_reason):
+        return False
+    if event is not None and event[0].located:
+        met = event[1].value
+        if settings.low <= met <= settings.high or not is_at_limit(met, settings):
+            return False
+        return is_at_limit(before.value, settings) or None
+    if not a * b < 0.0 or (event is not None and event[0].kind is not Kind.SN):
+        return False
+    limit = settings.high if upper else settings.low
+    share = a / (a - b)
+    near = abs(before.value + 0.5 * a * share * step - limit)
+    far = abs(after.value - 0.5 * b * (1.0 - share) * step - limit)
+    if max(near, far) < _NEAR_LIMIT * settings.width and is_at_limit(before.value, settings):
+        return True
+    apart = min(abs(before.value - limit), abs(after.value - limit))
+    return None if min(near, far) < apart else False
 
 
 def limit_crossed(

@@ -36,6 +36,9 @@ SAME_VALUE, SAME_FOLD = 1e-9, 1e-4
 NO_LENGTH = 1e-6
 #: A multiplier this large is that of an exit without a rate.
 _INFINITE = 1e8
+#: An event is located to this share of :data:`SAME_LOCATION`: a multiplier that falls as c over the distance
+#: is larger than its inverse there if it passes -1, at the distance c, farther than that.
+_LOCATED = 1e-4
 #: Share of the widest distance that is taken: a parabola predicts the parameter there.
 _WITHIN = 0.9
 #: Most that a point may be off its prediction, in distances to the event: beyond that it may lie on the other
@@ -68,6 +71,19 @@ def last_told(
     if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
         return beyond
     return _if_finite(point_before(here, beyond, SAME_LOCATION, settings))
+
+
+def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) -> Point:
+    """Return the first point of a step at which the signs of multipliers are told.
+
+    At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
+    """
+    at_event = np.min(before.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION
+    pole = at_event and np.max(np.abs(before.mu), initial=0.0) > 1.0 / _LOCATED
+    if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
+        return before
+    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    return _if_finite(point_before(here, before, -SAME_LOCATION, settings)) or before
 
 
 def _comes_in(here: Orbit) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
 from contfric.continuation.events import Bifurcation, End, EndReason, Kind
-from contfric.continuation.limits import is_at_limit, limit_crossed, limit_end
+from contfric.continuation.limits import ends_at_limit, is_at_limit, limit_crossed, limit_end
 from contfric.continuation.locate import belongs_to, locate_events
 from contfric.continuation.near_sliding_events import SAME_LOCATION
 from contfric.continuation.points import EXTRA, Point, Settings
@@ -49,8 +49,13 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.drop_tip()  # beyond it the same orbits come again, half a cycle later
         side.end = End(EndReason.POINT)
         return True
-    missed = not located and limit is None and violates(after)
-    if _comes_closer(side, located, missed, after.arc - before.arc):
+    fails = violates(after if limit is None else limit[0])
+    at_limit = fails and ends_at_limit(located, before, after, settings)
+    if at_limit:
+        side.drop_tip()
+        side.end = limit_end(before.value, settings)
+        return True
+    if _comes_closer(side, located, at_limit is None, after.arc - before.arc):
         return False
     if located and is_on_section(located[0][0]):
         side.drop_tip()
@@ -131,16 +136,15 @@ def _is_known(
 
 
 def _comes_closer(
-    side: Side, located: list[tuple[Bifurcation, Point]], missed: bool, step: float
+    side: Side, located: list[tuple[Bifurcation, Point]], undecided: bool, step: float
 ) -> bool:
     """Go back to the point before an event near which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
-    across may end on the other curve, and what is between its ends belongs to neither. And where a slide has
-    exactly no length the equations may have no pivot by rounding: a condition that is violated after a step
-    is ``missed`` if its location is just that, and no other trial is solved as well.
+    across may end on the other curve, and what is between its ends belongs to neither. And whether a branch
+    ends at a limit may be ``undecided``.
     """
-    fails = missed or any(point.lost or point.rough for _, point in located)
+    fails = undecided or any(point.lost or point.rough for _, point in located)
     if not fails or step < NEAREST:
         return False
     side.drop_tip()

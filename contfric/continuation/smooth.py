@@ -19,7 +19,12 @@ from contfric.continuation.folds import (
     not_located,
 )
 from contfric.continuation.locate_change import locate_change, locate_label
-from contfric.continuation.near_sliding_events import NO_LENGTH, SAME_LOCATION, last_told
+from contfric.continuation.near_sliding_events import (
+    NO_LENGTH,
+    SAME_LOCATION,
+    first_told,
+    last_told,
+)
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
 from contfric.continuation.side import first_point
@@ -51,7 +56,12 @@ def smooth_events(
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     # events after a sliding one do not happen
     after = last_told(orbit, before, after, beyond, settings) or after
-    values = zip(before.tests[base:].tolist(), after.tests[base:].tolist(), strict=True)
+    told = first_told(orbit, before, after, settings)
+    values = zip(
+        [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()],
+        after.tests[base:].tolist(),
+        strict=True,
+    )
     found: list[Located] = []
     folded = False
     for column, (a, b) in zip((FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR), values, strict=True):
@@ -59,7 +69,7 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL:
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        if column != FOLD and _is_rounding(orbit, before, after, base + column, settings):
+        if column != FOLD and _is_rounding(orbit, told, after, base + column, settings):
             continue
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         may_cross = column == CHI_ONE and orbit.model.symmetry is None
@@ -68,7 +78,8 @@ def smooth_events(
             if crossing is not None:
                 found.append(crossing)
                 continue
-        point = locate_change(orbit, before, after, settings, BY_TEST, base + column)
+        first = before if column == FOLD else told
+        point = locate_change(orbit, first, after, settings, BY_TEST, base + column)
         lost = point is None or point.lost
         if point is not None and (lost or _is_pole(point.tests[base + column], a, b)):
             point = None

@@ -33,9 +33,9 @@ from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.vectors import subtract_eight
 from contfric.models.definition import FloatArray
 
-#: Share of a border row's entry below which all other pivots for it are rounding. Larger ones may be true: at
-#: 1e-12 a bridge of Fig. 4 ends at S = 1e-5, where its slides are of that length, instead of S = 0.
-_WEAK = 1e-14
+#: Share of an entry of the border row below which it is the pivot itself: above it that row keeps at least
+#: half of its digits. Whether other pivots are small or rounding need not be told.
+_WEAK = 1e-8
 
 
 class Elimination(NamedTuple):

@@ -5,6 +5,7 @@ The scenes are those of the stress run (``benchmarks/stress/restarts.py``), by s
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -14,13 +15,13 @@ import restarts
 from report import Tally
 
 import contfric as cf
+from contfric.atlas.balance import _solved_at
+from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.continuation import resolve
 from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.doubling_point import _LOCATED, opening
-from contfric.continuation.events import TERMINAL
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import settings_of
 from contfric.continuation.report import ROUGH
 
 #: Scenes by what was wrong with them.
@@ -213,36 +214,91 @@ def test_a_narrow_bridge_is_held_against_how_well_its_ends_are_known_in_its_own_
         assert any(w * width < o < w for w, o in zip(known, own, strict=True)), (known, own)
 
 
-def test_what_is_not_located_in_one_step_is_located_in_a_shorter_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Where a slide has exactly no length no trial may be solved: a branch ended just before its event."""
-    located, missed = resolve.locate_events, [0]
+def test_a_bridge_reaches_the_limit_at_which_it_turns_in_any_step() -> None:
+    """Without friction all orbits of two natural periods are a continuum, and singular: S is a square there.
 
-    def at_second_sight(
-        orbit: cf.Orbit, before: Point, after: Point, settings: Settings
-    ) -> list[tuple[cf.Bifurcation, Point]]:
-        found = located(orbit, before, after, settings)
-        if after.arc - before.arc < 1e-4 or not any(b.kind in TERMINAL for b, _ in found):
-            return found
-        missed[0] += 1
-        return []
+    A step beyond the vertex, where holds are negative, gave a fold that was not located, up to S = 0.002.
+    """
+    rng, reached = np.random.default_rng(5), 0
+    for limit in rng.uniform(0.38, 0.42, 3):
+        params = {"Omega": 0.5, "S": 0.041, "S0": float(limit)}
+        diagram = cf.explore(cf.find_orbit("coulomb", params), "S", (0.0, 0.1))
+        bridges = [b for b in diagram.branches if not b.mirrored and b.values.min() < 1e-4]
+        assert len(bridges) == 2 and not diagram.loose_ends
+        for bridge in bridges:
+            for _ in range(10):
+                step, k = float(10.0 ** rng.uniform(-2.3, -0.4)), int(rng.integers(len(bridge)))
+                if bridge.values[k] < 1e-4:
+                    continue
+                again = cf.continue_orbit(bridge[k], "S", (0.0, 0.1), max_step=step)
+                assert {end.reason for end in again.ends} == {end.reason for end in bridge.ends}
+                assert cf.Kind.SN not in {b.kind for b in again.bifurcations}, (limit, step)
+                assert again.values.min() < 1e-7, (limit, step)
+                reached += 1
+    assert reached > 25
 
-    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
-    for friction in (0.32, 0.31, 0.33):
-        orbit = cf.find_orbit("coulomb", {**params, "S": friction})
-        plain = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends
-        with monkeypatch.context() as patch:
-            patch.setattr(resolve, "locate_events", at_second_sight)
-            closer = cf.continue_orbit(orbit, "Omega", (0.4, 0.6)).ends
-        assert [end.reason for end in closer] == [end.reason for end in plain]
-        for end, other in zip(closer, plain, strict=True):
-            assert end.bifurcation is not None and other.bifurcation is not None
-            gap = abs(end.bifurcation.params["Omega"] - other.bifurcation.params["Omega"])
-            assert gap < 1e-11
-    assert missed[0] >= 6
-    orbit = cf.find_orbit("coulomb", {**restarts.scene(42, 56).params, "zeta": 0.0}, longest=1000)
-    assert not cf.explore(orbit, "Omega", restarts.scene(42, 56).range).loose_ends
+
+def test_a_doubling_next_to_an_infinite_multiplier_is_found_from_either_side() -> None:
+    """It passes -1 at 4e-5 from the AS at which it is infinite: nobody saw it in a first step from there."""
+    rng, low, high = np.random.default_rng(6), 0.26070, 0.26081
+    params = {"Omega": 0.10142708114, "S": 0.168751473, "h": 0.45396473416, "zeta": 0.00810911}
+    for share in rng.uniform(-1e-5, 1e-5, 3):
+        here = {**params, "S0": 0.26075, "S": params["S"] * (1.0 + float(share))}
+        diagram = cf.explore(cf.find_orbit("coulomb", here, longest=1000), "S0", (low, high))
+        bridge = next(b for b in diagram.branches if b.bridge)
+        again = cf.explore(bridge[len(bridge) // 2], "S0", (low, high))
+        found = [
+            [b.params["S0"] for b in d.bifurcations if b.kind is cf.Kind.PD]
+            for d in (diagram, again)
+        ]
+        assert len(found[0]) == len(found[1]) == 1, share
+        assert abs(found[0][0] - found[1][0]) < 1e-11, share
+
+
+def test_bridges_have_their_doublings_when_copies_are_raised() -> None:
+    """A bridge that was traced with one copy has none, and only a restart with more of them found any."""
+    rng, found, ends = np.random.default_rng(4), 0, (0.458, 0.519)
+    for friction in rng.uniform(0.2037, 0.2049, 2):
+        params = {"Omega": 0.4885, "S": float(friction), "S0": 0.31744, "zeta": -0.008924}
+        orbit = cf.find_orbit("coulomb", params)
+        asked = settings_of(orbit, "Omega", ends, None, True, 20_000)
+        state = Exploration(replace(asked, copies=1), 2, 1, 3000, True, None)
+        one = cf.explore(orbit, "Omega", ends, max_periods=2, copies=1)
+        for branch in one.branches:
+            if not branch.mirrored:
+                state.add(branch)
+        assert not any(event.bifurcation.kind is cf.Kind.PD for event in state.events)
+        state.raise_copies(2)
+        raised = [e for e in state.events if e.bifurcation.kind is cf.Kind.PD]
+        assert all(event in state.waiting for event in raised)
+        met = {e.bifurcation.params["Omega"] for e in raised}
+        both = cf.explore(orbit, "Omega", ends, max_periods=2, copies=2).bifurcations
+        for b in (b for b in both if b.kind is cf.Kind.PD and b.orbit.periods == 1):
+            assert min(abs(b.params["Omega"] - value) for value in met) < 1e-10
+            found += 1
+    assert found >= 2
+
+
+def test_orbits_between_two_points_are_as_far_along_as_is_asked() -> None:
+    """Solved normal to a chord in the product of a narrow branch, they were up to half a step elsewhere."""
+    rng, solved = np.random.default_rng(8), 0
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
+    width = diagram.range[1] - diagram.range[0]
+    for branch in (b for b in diagram.branches if not b.mirrored):
+        arcs = branch.nodes[0]
+        for k in rng.integers(1, len(arcs), 12):
+            step, share = arcs[k] - arcs[k - 1], float(rng.uniform(0.2, 0.8))
+            if step < 1e-6:
+                continue
+            before = branch.between(float(arcs[k - 1]))
+            there = _solved_at(branch, float(arcs[k - 1] + share * step), width)
+            assert there is not None
+            off = (there.params["Omega"] - before.params["Omega"]) / width
+            moved = np.sqrt(np.mean(np.sum((there.joints - before.joints) ** 2, axis=1)) + off**2)
+            assert abs(moved - share * step) < 1e-3 * step, (branch.name, k, share)
+            solved += 1
+    assert solved > 40
 
 
 def test_branches_that_end_nearer_to_their_vertex_than_they_can_be_solved() -> None:
