@@ -72,11 +72,12 @@ class RestingPosition:
     --------
     >>> import contfric as cf
     >>> brake = {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"}
-    >>> model = cf.Mechanism([[1.0]], [[0.1]], [[1.0]], contacts={"brake": brake}, force={"q1": "F*cos(w*t)"},
-    ...                      parameters={"w": 0.5, "F": 0.25, "S": 0.3, "S0": 0.4}, period="2*pi/w")
+    >>> stiffness, parameters = [[2.0, -1.0], [-1.0, 2.0]], {"w": 0.7, "S": 0.5, "S0": 0.6}
+    >>> model = cf.Mechanism("identity", [[0.1, 0.0], [0.0, 0.1]], stiffness, contacts={"brake": brake},
+    ...                      force={"q2": "0.2*cos(w*t)"}, parameters=parameters, period="2*pi/w")
     >>> orbit = cf.find_orbit(model, at={"brake": 0.05})
     >>> print(orbit.resting[0])
-    contact 'brake' rests at q1 = 0.05, may rest in [-0.15, 0.15]
+    contact 'brake' rests at q1 = 0.05, may rest in [-0.311795, 0.311795]
     >>> orbit.resting_at({"brake": 0.1}).resting[0].value
     0.1
     """
