@@ -84,6 +84,7 @@ if TYPE_CHECKING:
     from contfric.orbit.find import find_orbit as find_orbit
     from contfric.orbit.gradient import Gradient as Gradient
     from contfric.orbit.orbit import Orbit as Orbit
+    from contfric.orbit.resting_positions import RestingPosition as RestingPosition
     from contfric.orbit.simulation import simulate as simulate
     from contfric.orbit.solve import solve_orbit as solve_orbit
     from contfric.quantities.registry import quantity_names as quantity_names

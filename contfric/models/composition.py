@@ -26,7 +26,7 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 from contfric.models.coded import Forms
-from contfric.models.contact_laws import ContactLaws, law_of
+from contfric.models.contact_laws import ContactLaws, law_of, rest_of
 from contfric.models.contact_modes import Combinations
 from contfric.models.contacts import Contact, ContactKind
 from contfric.models.description import ModeText
@@ -187,7 +187,8 @@ class Composition:
             if contact.kind is not ContactKind.FRICTION or letter != "s":
                 known[letter] = {contact.name: letter}
                 texts.get(f"power {letter}")
-        return ContactLaws(contact.name, Made(key_of, self.is_mode), texts)
+        kept = Made(key_of, self.is_mode)
+        return ContactLaws(contact.name, kept, texts, **rest_of(self.structure, contact))
 
     def check(self) -> None:
         """Read the rates of all contacts in each of their states; what cannot be read is reported.

@@ -12,6 +12,10 @@ In a written-out model::
       brake:
         modes: {p: '0', s: '1'}
         texts: {force 0: -(S), power 0: (S)*(v1), force 1: -(u_brake), power 1: 0}
+        rest: q1
+
+Where a contact rests that never slips: the displacement of what sticks, minus the stretch of a Jenkins
+element (``rest``), which may be said (``at``). Friction against what moves by itself has no such position.
 """
 
 from __future__ import annotations
@@ -20,9 +24,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from contfric.models.contacts import Contact, ContactKind
+from contfric.models.contacts import Contact, ContactKind, is_at_rest
 from contfric.models.entries import Part
-from contfric.models.matrices import times
+from contfric.models.matrices import summed, times
 
 if TYPE_CHECKING:
     from contfric.models.names import Names
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
 
 KEY = "forces"
 _LOSS = "loss"
+_POSITION = ("rest", "at")
 
 
 @dataclass(frozen=True)
@@ -40,11 +45,15 @@ class ContactLaws:
     ----------
     modes : which of its laws holds in each mode
     texts : the expressions of each law, and of what is lost at an impact
+    rest : expression of the position that it keeps while it sticks, linear in the states; empty without one
+    at : where it rests if it never slips, an expression of the parameters; empty if the motion decides
     """
 
     name: str
     modes: Mapping[str, str]
     texts: Mapping[str, str]
+    rest: str = ""
+    at: str = ""
 
     def force(self, mode: str) -> str:
         """Return the force in a mode, an expression."""
@@ -85,7 +94,17 @@ def _written(
         e, over = contact.texts["restitution"], structure.mobility(contact, contact)
         w = structure.approach(contact)
         texts[_LOSS] = f"(1 - ({e})**2)*({w})**2/(2*({over}))"
-    return {"modes": in_mode, "texts": texts}
+    return {"modes": in_mode, "texts": texts, **rest_of(structure, contact)}
+
+
+def rest_of(structure: Structure, contact: Contact) -> dict[str, str]:
+    """Return what a contact keeps while it sticks, and where it is to rest, as they are written out."""
+    fixed = contact.kind is ContactKind.FRICTION and is_at_rest(contact)
+    if not (fixed or contact.kind is ContactKind.JENKINS):
+        return {}
+    parts = [times(repr(w), structure.coordinates[i]) for i, w in contact.direction.items()]
+    stretch = [] if fixed else [f"-{contact.name}"]
+    return {"rest": summed([*parts, *stretch]), **({"at": contact.at} if contact.at else {})}
 
 
 def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) -> tuple[str, str]:
@@ -107,12 +126,13 @@ def read_laws(top: Part) -> tuple[ContactLaws, ...]:
     found = []
     for name in part.data:
         entry = part.part(name, "{modes: ..., texts: ...}")
-        entry.only(("modes", "texts"))
+        entry.only(("modes", "texts", *_POSITION))
         modes, texts = (
             {k: str(v) for k, v in entry.part(key, "a mapping of texts").data.items()}
             for key in ("modes", "texts")
         )
-        found.append(ContactLaws(name, modes, texts))
+        position = {key: str(entry.data[key]) for key in _POSITION if key in entry.data}
+        found.append(ContactLaws(name, modes, texts, **position))
     return tuple(found)
 
 
@@ -121,8 +141,17 @@ def check_laws(laws: tuple[ContactLaws, ...], names: Names, timed: bool) -> None
     for contact in laws:
         for key, text in contact.texts.items():
             names.check((KEY, contact.name, "texts", key), text, timed)
+        for key in _POSITION:
+            if text := getattr(contact, key):
+                names.check((KEY, contact.name, key), text, False)
 
 
 def written(laws: tuple[ContactLaws, ...]) -> dict[str, Any]:
     """Return laws in the schema of the files."""
-    return {c.name: {"modes": dict(c.modes), "texts": dict(c.texts)} for c in laws}
+    return {
+        c.name: {
+            **{"modes": dict(c.modes), "texts": dict(c.texts)},
+            **{key: text for key in _POSITION if (text := getattr(c, key))},
+        }
+        for c in laws
+    }

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from contfric.errors import ModelError
@@ -51,6 +51,9 @@ KEYS = {
     ContactKind.IMPACT: ("gap", "restitution"),
 }
 _OPTIONAL = ("static",)
+#: Where a contact rests that never slips, if the motion is not to decide.
+_AT = "at"
+_POSITIONED = dict.fromkeys((ContactKind.FRICTION, ContactKind.JENKINS), (_AT,))
 #: What an impact may say: that it comes to rest after infinitely many impacts.
 _CHATTER = "chatter"
 #: What the direction of each kind is the gradient of.
@@ -72,6 +75,7 @@ class Contact:
     direction : (coordinate, weight), the entries of W that are not zero
     form : what W is the gradient of, an affine form of states and time
     chatter : whether impacts may come to rest, a mode of its own
+    at : where it rests if it never slips, an expression of the parameters; empty if the motion decides
     """
 
     name: str
@@ -80,6 +84,7 @@ class Contact:
     direction: Mapping[int, float]
     form: Affine = field(repr=False)
     chatter: bool = False
+    at: str = ""
 
     @property
     def states(self) -> str:
@@ -130,7 +135,7 @@ def read_contacts(
                 f"'{name}' is a coordinate, velocity or parameter: give the contact another name",
             )
         kind = ContactKind(entry.one_of("kind", [k.value for k in ContactKind], "kind of contact"))
-        own_keys = (_CHATTER,) if kind is ContactKind.IMPACT else ()
+        own_keys = (_CHATTER,) if kind is ContactKind.IMPACT else _POSITIONED.get(kind, ())
         entry.only(("kind", *KEYS[kind], *own_keys))
         texts = {
             key: _expression(entry, key)
@@ -141,9 +146,31 @@ def read_contacts(
         count = len(coordinates)
         shift = count if kind is ContactKind.FRICTION else 0
         direction = _direction(entry, _DIRECTION[kind], form, shift, count)
-        rests = bool(entry.flag(_CHATTER)) if own_keys else False
-        found.append(Contact(name, kind, texts, direction, form, rests))
+        rests = kind is ContactKind.IMPACT and bool(entry.flag(_CHATTER))
+        contact = Contact(name, kind, texts, direction, form, rests)
+        found.append(replace(contact, at=_position(entry, contact, scope)))
     return found
+
+
+def _position(entry: Part, contact: Contact, scope: Scope[Affine]) -> str:
+    """Return where a contact is to rest; empty if nothing is said."""
+    if entry.data.get(_AT) is None:
+        return ""
+    text = _expression(entry, _AT)
+    if set(_form(entry, _AT, {_AT: text}, scope).parts) - {CONSTANT}:
+        entry.fail(_AT, f"'{_AT}' is made of numbers and parameters, such as 0.12, got {text}")
+    if contact.kind is ContactKind.FRICTION and not is_at_rest(contact):
+        entry.fail(
+            _AT,
+            f"what '{contact.name}' rubs on moves ({contact.texts['velocity']}), so that it has no place "
+            "of rest: leave 'at' out",
+        )
+    return text
+
+
+def is_at_rest(contact: Contact) -> bool:
+    """Tell whether the velocity of a friction contact is one of coordinates alone: nothing else moves."""
+    return all(kind == "y" for kind, _ in contact.form.parts)
 
 
 def _is_jenkins(entry: object) -> bool:

@@ -171,6 +171,7 @@ def _measured(
                     k: f"{time!r}*({text(v)})" if k.startswith("power") else text(v)
                     for k, v in law["texts"].items()
                 },
+                **({"rest": text(law["rest"])} if "rest" in law else {}),
             }
             for name, law in data["forces"].items()
         }

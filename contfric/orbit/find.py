@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,7 @@ from contfric.orbit.aperiodic import (
 )
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.places import Places
 from contfric.orbit.repetition import shortest
 from contfric.orbit.rest import check_rest, comes_to_rest, is_point, winds
 from contfric.orbit.sections import is_smooth, loops, without_sections
@@ -63,6 +64,7 @@ def find_orbit(
     *,
     state: ArrayLike | None = None,
     time: float = 0.0,
+    at: Mapping[str, float] | None = None,
     longest: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
@@ -73,6 +75,8 @@ def find_orbit(
     periods : int, optional
         Period wanted, in periods of the excitation; by default any from 1 to 64.
     state, time : initial condition; by default displaced from rest
+    at : where contacts rest that never slip along the orbit, such as ``{"brake": 0.12}``; by default where
+        the model's file says (``at``), else where the simulation leaves them
     longest : int, optional
         Periods to simulate before the motion is called aperiodic; by default 50,000, or fewer (not below
         1,000) where it has many states and meets many events.
@@ -84,6 +88,8 @@ def find_orbit(
         If no period up to 64 is found; ``result`` is the trajectory's last part.
     ConvergenceError
         If the mass stays stuck, or the period found is not the one wanted.
+    ParameterError
+        If a contact slips along the orbit, or cannot rest where ``at`` says.
 
     Examples
     --------
@@ -98,7 +104,18 @@ def find_orbit(
         longest = whole_number("longest", longest, least=1)
     function_of("progress", progress)
     checked, time = model.check_params({} if params is None else params), real_number("time", time)
-    return _wanted(_settled(model, checked, state, time, longest, progress=progress), periods)
+    places = Places(model, checked, at)
+    begun = places.begin(state)
+    return places.put(
+        _wanted(_settled(model, checked, begun, time, longest, progress=progress), periods)
+    )
+
+
+def simulated_orbit(
+    model: Model, params: dict[str, float], state: FloatArray, time: float, longest: int
+) -> Orbit:
+    """Return the orbit that the solution from a state converges to, wherever its contacts rest."""
+    return _settled(model, params, state, time, longest)
 
 
 @remembered()

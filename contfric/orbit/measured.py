@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from contfric.orbit.gradient import Gradient
     from contfric.orbit.integrals import Integrals
     from contfric.orbit.orbit import Orbit
+    from contfric.orbit.resting_positions import RestingPosition
     from contfric.orbit.slides import Outline
     from contfric.orbit.system import IntArray
     from contfric.quantities.registry import QuantityLike
@@ -27,6 +29,32 @@ class MeasuredOrbit(Shown):
         from contfric.orbit.slides import outline_of
 
         return outline_of(cast("Orbit", self))
+
+    @cached_property
+    def resting(self) -> tuple[RestingPosition, ...]:
+        """Where the contacts rest that never slip along the orbit, and where else they may.
+
+        Each is a :class:`contfric.RestingPosition`; ``resting_at`` returns the orbit at another one.
+        """
+        from contfric.orbit.resting_positions import resting_of
+
+        return resting_of(cast("Orbit", self))
+
+    def resting_at(self, at: Mapping[str, float]) -> Orbit:
+        """Return the orbit at the same parameters whose contacts rest elsewhere.
+
+        Parameters
+        ----------
+        at : position by contact, such as ``{"brake": 0.12}``; all others keep theirs
+
+        Raises
+        ------
+        ParameterError
+            If a contact slips along the orbit, or cannot rest there.
+        """
+        from contfric.orbit.resting_positions import resting_at
+
+        return resting_at(cast("Orbit", self), at)
 
     def extreme(
         self, observable: int, inside: int, sign: float

@@ -392,4 +392,5 @@ class Orbit(MeasuredOrbit):
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         name = self.name if self.converged else "not solved"  # an iterate may walk no signature
-        return f"<Orbit {name}: {values}; {self.status.name.lower()}>"
+        kept = "".join(f"; {r}" for r in self.resting) if self.converged else ""
+        return f"<Orbit {name}: {values}; {self.status.name.lower()}{kept}>"

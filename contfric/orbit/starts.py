@@ -105,7 +105,8 @@ def _side_of_rates(
         return bounds or (bool(domain.declared) and len(own) == 1)
 
     def enters(domain: Domain, surface: Surface) -> bool:
-        if signs[surface.name] != 0 or not ends(domain, surface):
+        lies_on = domain.signs[surface.name] == 0  # where a contact sticks
+        if signs[surface.name] != 0 or lies_on or not ends(domain, surface):
             return True
         rate = flow.rate(domain.mode, surface.observable, t, y)
         return domain.signs[surface.name] * rate > 0.0

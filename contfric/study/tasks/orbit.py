@@ -44,6 +44,11 @@ class Start(Task):
         None, min_length=1, description="the name of a signature, or the path of its file"
     )
     orbit: str | None = Field(None, min_length=1, description="the path of a saved orbit (.npz)")
+    at: dict[str, float] | None = Field(
+        None,
+        description="a mapping of contacts that never slip to the position at which they rest, such as "
+        "{brake: 0.12}",
+    )
 
     def check(self, asked: StudyCheck) -> None:
         """Refuse two origins, and a state of another model."""
@@ -53,6 +58,11 @@ class Start(Task):
             asked.fail(("start",), f"'start' has one of simulate, signature, orbit; got {got}")
         state = self.simulate.state if self.simulate else None
         asked.check_state(("start", "simulate", "state"), state)
+        if self.at is not None:
+            from contfric.orbit.kept_positions import checked_positions
+
+            at = self.at
+            asked.attempt(("start", "at"), lambda: checked_positions(asked.model, at))
 
     def does(self, study: Study) -> str:
         """Return the origin of the orbit, in words."""
@@ -65,6 +75,8 @@ class Start(Task):
             text += f"; from the state {self.simulate.state}"
         if self.simulate and self.simulate.periods is not None:
             text += f"; {self.simulate.periods} period(s)"
+        if self.at:
+            text += "; at rest " + ", ".join(f"{name} at {x:g}" for name, x in self.at.items())
         return text
 
     def tables(self, study: Study) -> tuple[str, ...]:
@@ -90,18 +102,19 @@ class Start(Task):
     def _orbit(self, job: Job) -> Orbit:
         study, heard = job.study, job.told("orbit")
         if study.orbit is not None:
-            return study.orbit
+            return study.orbit.resting_at(self.at or {})
         if study.signature is not None:
             from contfric.orbit.solve import solve_orbit
 
             heard(f"solving for {study.signature.name or study.signature}")
-            return solve_orbit(study.model, study.signature, study.params, progress=heard)
+            found = solve_orbit(study.model, study.signature, study.params, progress=heard)
+            return found.resting_at(self.at or {})
         from contfric.orbit.find import find_orbit
 
         assert self.simulate is not None
         heard("simulating")
         how = self.simulate.model_dump()
-        return find_orbit(study.model, study.params, progress=heard, **how)
+        return find_orbit(study.model, study.params, progress=heard, at=self.at, **how)
 
     def cut_short(self, found: Orbit) -> bool:
         """Ctrl-C leaves no orbit."""
@@ -126,13 +139,17 @@ class Start(Task):
 
     def entries(self, found: Orbit) -> dict[str, Any]:
         """Return what the orbit is."""
+        start = {
+            "signature": found.name,
+            "segments": str(found.signature),
+            "periods": found.periods,
+            "params": found.params,
+            "residual": found.residual,
+        }
         return {
             "start": {
-                "signature": found.name,
-                "segments": str(found.signature),
-                "periods": found.periods,
-                "params": found.params,
-                "residual": found.residual,
+                **start,
+                **({"rests": list(map(str, found.resting))} if found.resting else {}),
             }
         }
 
@@ -144,6 +161,7 @@ class Start(Task):
             values = ", ".join(f"{name} = {value:g}" for name, value in start["params"].items())
             yield f"start     {start['signature']} over {start['periods']} period(s), {values}"
             yield f"          {start['segments']}"
+            yield from (f"          {rests}" for rests in start.get("rests", ()))
 
 
 def points_text(study: Study) -> str:
