@@ -9,7 +9,7 @@ from typing import Any
 
 #: Of each class, the attributes that its table shows; those of its base classes if it is not named.
 _FACTS = {
-    "Orbit": "signature periods period multipliers stable x_max x_min resting residual status",
+    "Orbit": "signature periods period multipliers stable x_max x_min residual status",
     "Trajectory": "params end",
     "Gradient": "value ahead notes",
     "Branch": "name bifurcations ends mirrored notes",

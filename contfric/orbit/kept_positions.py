@@ -39,6 +39,22 @@ class Position(NamedTuple):
         """Return the value along an orbit."""
         return float(self.weights @ orbit.joints[0, 1:])
 
+    def said(self, orbit: Orbit) -> str:
+        """Return in words where it is along an orbit."""
+        return at_rest(self.contact or self.text, self.text, self.value(orbit))
+
+
+def at_rest(contact: str, text: str, value: float) -> str:
+    """Return in words what is kept at a value, and whose it is.
+
+    Examples
+    --------
+    >>> at_rest("brake", "q1", 0.12)
+    "contact 'brake' rests at q1 = 0.12"
+    """
+    whose = f"contact '{contact}' rests at " if contact != text else ""
+    return f"{whose}{text} = {value:.6g}"
+
 
 def positions_of(orbit: Orbit) -> tuple[Position, ...]:
     """Return what an orbit keeps: contacts that never slip along it; elsewhere functions of states."""

@@ -392,5 +392,8 @@ class Orbit(MeasuredOrbit):
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         name = self.name if self.converged else "not solved"  # an iterate may walk no signature
-        kept = "".join(f"; {r}" for r in self.resting) if self.converged else ""
+        from contfric.orbit.kept_positions import positions_of
+
+        # where else they may rest takes solves (resting)
+        kept = "".join(f"; {p.said(self)}" for p in positions_of(self)) if self.converged else ""
         return f"<Orbit {name}: {values}; {self.status.name.lower()}{kept}>"

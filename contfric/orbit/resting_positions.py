@@ -23,7 +23,13 @@ import numpy as np
 from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.conserved import conserved
-from contfric.orbit.kept_positions import Position, checked_positions, places_of, positions_of
+from contfric.orbit.kept_positions import (
+    Position,
+    at_rest,
+    checked_positions,
+    places_of,
+    positions_of,
+)
 from contfric.orbit.slack import margin_slack
 from contfric.orbit.solve import refine, refine_with_symmetry
 
@@ -93,8 +99,8 @@ class RestingPosition:
         ends = [f"{end:.6g}" for end in (self.lower, self.upper)]
         found = f"[{ends[0]}, {ends[1]}]"
         known = "at least " if any(limit.startswith("(") for limit in self.limits) else ""
-        what = f"contact '{self.contact}' rests at " if self.contact != self.text else ""
-        return f"{what}{self.text} = {self.value:.6g}, may {'rest' if what else 'be'} {known}in {found}"
+        may = "rest" if self.contact != self.text else "be"
+        return f"{at_rest(self.contact, self.text, self.value)}, may {may} {known}in {found}"
 
 
 def resting_of(orbit: Orbit) -> tuple[RestingPosition, ...]:
