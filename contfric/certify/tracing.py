@@ -70,8 +70,10 @@ class Tracer(Strand):
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
-        self.near = self.nearly_singular(points)
+        self.printed_orbits = self.enclosed(points)
+        self.unique = {k for k, point in enumerate(points) if point.unique.proved}
         self.held: set[int] = set()
+        self.obeying: set[int] = set()
         for flip in self.flips:
             if flip is not None:
                 self._hold(flip)
@@ -87,9 +89,18 @@ class Tracer(Strand):
                     return flip_at(self, turns, self.far_from(end))
         return None
 
-    def _hold(self, box: Box | Flip) -> None:
-        """Note which of these orbits are on the curve of a proved box."""
-        self.held |= {k for k, zero in self.near.items() if box.holds(zero)}
+    def _hold(self, box: Box | Flip, arcs: Arcs | None = None) -> None:
+        """Note which printed orbits are on the curve of a proved box, all of which is admissible.
+
+        Looked at are those that may not be alone within their stated error, which is large next to a PD or
+        BP; and, of those between two arclengths, whether they are admissible.
+        """
+        for k, zero in self.printed_orbits.items():
+            near = arcs is not None and arcs[0] <= self.branch.arc[k] <= arcs[1]
+            if (near or k not in self.unique) and box.holds(zero):
+                self.held.add(k)
+                if near:
+                    self.obeying.add(k)
 
     # ------------------------------------------------------------------ steps
 
@@ -239,7 +250,7 @@ class Tracer(Strand):
         """Return a piece with its link to the one before; from now on it is the last one."""
         before, self.last = self.last, box
         if piece.proved:
-            self._hold(box)
+            self._hold(box, None if piece.ends else (piece.start, piece.stop))
         if before is None:
             return piece
         if isinstance(before, Box):
