@@ -98,32 +98,28 @@ class Path:
         """Return the extended state at the middle of piece ``index`` of 2^level."""
         key = (level, index)
         if key not in self._states:
-            self._states[key] = self._flow(level, index) * self.start
+            shift = self._shift(level + 1)
+            flow = self._flow(level, index) * shift if index else shift
+            self._states[key] = flow * self.start
         return self._states[key]
 
     def _flow(self, level: int, index: int) -> arb_mat:
-        """Return the flow up to the middle of a piece: a product is forty times cheaper than an exponential.
+        """Return the flow up to a piece: a product of those over halves, quarters, ... of the segment.
 
-        It is that up to a neighbour and a piece more; else that of the piece that was halved, and a quarter.
+        Products are forty times cheaper than exponentials. Going from piece to piece, or back and forth,
+        their radii would be larger.
         """
-        key = (level, index)
-        if key not in self._flows:
-            if (level - 1, index // 2) in self._flows:
-                shift = self._shift(level + 1 if index % 2 else -level - 1)
-                self._flows[key] = self._flows[level - 1, index // 2] * shift
-            elif index == 0:
-                self._flows[key] = self._shift(level + 1)
-            else:
-                for k in range(1, index + 1):  # no deeper recursion than one
-                    if (level, k) not in self._flows:
-                        self._flows[level, k] = self._flow(level, k - 1) * self._shift(level)
-        return self._flows[key]
+        while index % 2 == 0:
+            level, index = level - 1, index // 2
+        if (level, index) not in self._flows:
+            shift = self._shift(level)
+            self._flows[level, index] = self._flow(level, index - 1) * shift if index > 1 else shift
+        return self._flows[level, index]
 
     def _shift(self, power: int) -> arb_mat:
-        """Return the flow over 2^-power of the segment; backwards for a negative one."""
+        """Return the flow over 2^-power of the segment."""
         if power not in self._shifts:
-            time = self.duration / 2 ** abs(power)
-            self._shifts[power] = (self.field * (time if power >= 0 else -time)).exp()
+            self._shifts[power] = (self.field * (self.duration / 2**power)).exp()
         return self._shifts[power]
 
     def size(self, level: int, index: int) -> arb:
