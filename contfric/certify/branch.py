@@ -212,11 +212,12 @@ def certify_branch(
         points.append(certify_orbit(orbit, inside=False))
     with working(_BITS):
         tracer = Tracer(branch, proofs, until, points)
-        pieces, steps = [], len(branch) - 1
-        for k in range(steps):
-            pieces += tracer.step(k)
+        pieces, steps, k = list[Piece](), len(branch) - 1, 0
+        while k < steps:
+            found, k = tracer.step(k)
+            pieces += found
             if progress is not None:
-                progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
+                progress(f"{branch.name}, step {k} of {steps}, {tracer.count} boxes")
     points = [
         replace(point, admissible=Finding(Verdict.PROVED))  # all orbits of its box are
         if k in tracer.obeying

@@ -31,6 +31,9 @@ HALVINGS = 12
 #: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
 #: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
 _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
+#: A box reaches over several steps of the branch if the last one was about as long; or if, after so many at
+#: most, it may be longer.
+_SAME, _PATIENT = 1.2, 32
 #: After so many boxes it is tried again whether they are found at once, by the half-widths of the last one.
 _AGAIN = 8
 #: Most parts of a box in which its inequalities are looked at.
@@ -68,6 +71,8 @@ class Tracer(Strand):
         self.count, self.ended, self.length = 0, "", math.inf
         self._known: tuple[int, Vector | None] = (-1, None)  # number of a point, and its orbit
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
+        # the last box that was proved, and how many in a row before one of several steps is tried
+        self.proved_length, self.patience = 0.0, _STEADY
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.printed_orbits = self.enclosed(points)
@@ -104,14 +109,47 @@ class Tracer(Strand):
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, k: int) -> list[Piece]:
-        """Cover the step from point k to the next one."""
-        printed = self.point(self.branch[k]), self.point(self.branch[k + 1])
-        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
+    def step(self, k: int) -> tuple[list[Piece], int]:
+        """Cover the branch from point k to a later one; return its number, too.
+
+        That is the next one, or one that is about as far as the last box reached.
+        """
+        last = self._reached(k)
+        return self._step(k, last), last
+
+    def _reached(self, k: int) -> int:
+        """Return the last point up to which a box is tried from point k: one step, or more."""
+        arc, found = self.branch.arc, k + 1
+        grows = _GROWTH if self.steady >= self.patience else _SAME
+        most = grows * min(self.length, self.proved_length)
+        while not (self._is_special(k) or self._is_special(found)):
+            if arc[found + 1] - arc[k] > most:
+                break
+            found += 1
+        return found
+
+    def _is_special(self, k: int) -> bool:
+        """Tell whether there is no step from point k, or one that is not only covered with boxes."""
+        at, count = self.branch.arc, len(self.branch)
+        ends = ((0, k == 0), (-1, k + 2 == count))
+        if k + 1 >= count or any(there and self.has_edge(end) for end, there in ends):
+            return True
+        return any(
+            flip is not None and abs(at[k + 1 - end] - at[-end]) < self.far
+            for end, flip in enumerate(self.flips)
+        )
+
+    def _longest(self) -> float:
+        """Return how long a box may be that is tried next."""
+        return (_GROWTH if self.steady >= _STEADY else _SLOW) * self.length
+
+    def _step(self, k: int, j: int) -> list[Piece]:
+        printed = self.point(self.branch[k]), self.point(self.branch[j])
+        arcs = (float(self.branch.arc[k]), float(self.branch.arc[j]))
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
         plane = [b - a for a, b in zip(*printed, strict=True)]
-        exact = [self._exact(k, printed[0], plane), self._exact(k + 1, printed[1], plane)]
+        exact = [self._exact(k, printed[0], plane), self._exact(j, printed[1], plane)]
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
@@ -120,7 +158,7 @@ class Tracer(Strand):
                     return []
                 if inside[end]:
                     return join(self, flip, first, last, arcs, end == 1)
-        left = k == 0 and self.has_edge(0), k + 2 == len(self.branch) and self.has_edge(-1)
+        left = k == 0 and self.has_edge(0), j + 1 == len(self.branch) and self.has_edge(-1)
         if all(left):
             middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
             if middle is not None:
@@ -162,8 +200,7 @@ class Tracer(Strand):
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
         splits = splits and self.missed < _IN_ROW
-        grows = _GROWTH if self.steady >= _STEADY else _SLOW
-        if length > grows * self.length and splits:
+        if length > self._longest() and splits:
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
@@ -179,10 +216,12 @@ class Tracer(Strand):
             piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
         whole = piece is not None and piece.proved and piece.decided
         if not (whole or refuted) and splits:
+            self.patience = min(2 * self.patience, _PATIENT) if level == 0 else self.patience
             self.length, self.steady = length / 2, 0
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
+        self.proved_length = length if whole else self.proved_length
         self.length = max(self.length, length) if whole else math.inf
         self.steady = self.steady + 1 if whole else _STEADY
         self.missed = 0 if box is not None else self.missed + 1
