@@ -34,6 +34,8 @@ _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
 #: A box reaches over several steps of the branch if the last one was about as long; or if, after so many at
 #: most, it may be longer.
 _SAME, _PATIENT = 1.2, 32
+#: Largest share of its rate that the ball of the rate of the parameter is to be, in boxes towards a BP or PD.
+_TURNS = 0.8
 #: After so many boxes it is tried again whether they are found at once, by the half-widths of the last one.
 _AGAIN = 8
 #: Most parts of a box in which its inequalities are looked at.
@@ -73,6 +75,7 @@ class Tracer(Strand):
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         # the last box that was proved, and how many in a row before one of several steps is tried
         self.proved_length, self.patience = 0.0, _STEADY
+        self.turning = False  # whether a box could not show that the parameter is monotone
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.printed_orbits = self.enclosed(points)
@@ -139,9 +142,20 @@ class Tracer(Strand):
             for end, flip in enumerate(self.flips)
         )
 
-    def _longest(self) -> float:
-        """Return how long a box may be that is tried next."""
-        return (_GROWTH if self.steady >= _STEADY else _SLOW) * self.length
+    def _allowed(self) -> float:
+        """Return how long the next box may be.
+
+        Towards a BP or PD the rate of the parameter vanishes; relative to it, its ball grows with the square
+        of the length. Once a box could not show its sign, that says how long others may be.
+        """
+        most = (_GROWTH if self.steady >= _STEADY else _SLOW) * self.length
+        if self.turning and isinstance(self.last, Box) and self.last.monotone:
+            assert self.last.tangent is not None
+            rate = self.last.tangent[-1]
+            share = float((rate.rad() / abs(rate.mid())).upper())
+            wanted = self.proved_length * math.sqrt(_TURNS / share)
+            most = min(most, max(wanted, self.length / 2))
+        return most
 
     def _step(self, k: int, j: int) -> list[Piece]:
         printed = self.point(self.branch[k]), self.point(self.branch[j])
@@ -183,10 +197,10 @@ class Tracer(Strand):
         why = Finding(Verdict.UNDECIDED, self.ended) if self.ended else NO_BOX
         return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
 
-    def middle(self, first: Vector, last: Vector) -> Vector | None:
-        """Return the orbit halfway between two others."""
+    def middle(self, first: Vector, last: Vector, share: float = 0.5) -> Vector | None:
+        """Return the orbit halfway between two others, or at another share of the way."""
         plane = [b - a for a, b in zip(first, last, strict=True)]
-        middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
+        middle = [(a + share * c).mid() for a, c in zip(first, plane, strict=True)]
         return solved(self.segments, self.build, self.plain, middle, plane)
 
     def _exact(self, k: int, printed: Vector, plane: Vector) -> Vector | None:
@@ -200,8 +214,9 @@ class Tracer(Strand):
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
         splits = splits and self.missed < _IN_ROW
-        if length > self._longest() and splits:
-            halves = self._halves(first, last, arcs, level)
+        parts = math.ceil(min(length / self._allowed(), 2**HALVINGS)) if splits else 1
+        if parts > 1:
+            halves = self._halves(first, last, arcs, level, (parts // 2) / parts)
             if halves is not None:
                 return halves
         self.count += 1
@@ -218,6 +233,7 @@ class Tracer(Strand):
         if not (whole or refuted) and splits:
             self.patience = min(2 * self.patience, _PATIENT) if level == 0 else self.patience
             self.length, self.steady = length / 2, 0
+            self.turning |= piece is not None and piece.folds == UNKNOWN and any(self.flips)
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
@@ -296,11 +312,13 @@ class Tracer(Strand):
             return replace(piece, linked=are_linked(self.segments, self.plain, before, box))
         return replace(piece, linked=box.holds(before))
 
-    def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
-        point = self.middle(first, last)
+    def _halves(
+        self, first: Vector, last: Vector, arcs: Arcs, level: int, share: float = 0.5
+    ) -> list[Piece] | None:
+        point = self.middle(first, last, share)
         if point is None:
             return None
-        between = 0.5 * (arcs[0] + arcs[1])
+        between = arcs[0] + share * (arcs[1] - arcs[0])
         return [
             *self.cover(first, point, (arcs[0], between), level + 1),
             *self.cover(point, last, (between, arcs[1]), level + 1),
