@@ -76,13 +76,10 @@ class Bounds:
         """Return bounds of ``C(s) G(c(s))``: how far the curve is from its chord ``m + s d``."""
         d = column(change)
         wanted = column([*[arb(0)] * (len(change) - 1), arb(1)])
-        parts = (
-            (self.inverse * column(residual), 1.0),
-            (self.inverse * (self.matrices[0] * d - wanted), self.half),
-            (self.turn * d, 0.5 * self.half**2),
-        )
-        total = sum(factor * upper(part)[:, 0] for part, factor in parts)
-        total = total + self.half * (self.rest @ upper(d)[:, 0])
+        middle, bend = self.inverse * column(residual), self.turn * d * arb(0.5 * self.half**2)
+        total = np.maximum(upper(middle), upper(middle + bend))[:, 0]  # of s^2 in [0, h^2]
+        total += self.half * upper(self.inverse * (self.matrices[0] * d - wanted))[:, 0]
+        total += self.half * (self.rest @ upper(d)[:, 0])
         return (np.eye(len(change)) + self.half * upper(self.turn)) @ total
 
     def applied(self, values: Vector, s: arb) -> FloatArray:

@@ -14,14 +14,16 @@ import itertools
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from contfric.base.shown import Shown
 from contfric.certify.certificate import Certificate
 from contfric.certify.events import EventCertificate, certify_event
+from contfric.certify.orbit import certify_orbit, with_inequalities
 from contfric.certify.piece import Piece
 from contfric.certify.tracing import Tracer
+from contfric.certify.verdict import Finding, Verdict
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import TERMINAL, EndReason
 from contfric.errors import ParameterError
@@ -83,7 +85,8 @@ class BranchCertificate(Shown):
     @property
     def points_proved(self) -> int:
         """How many of the printed orbits are proved, with their stability; at an event none can be."""
-        return sum(point.proved or k in self.held for k, point in enumerate(self.points))
+        numbered = enumerate(self.points)
+        return sum(p.proved or (k in self.held and p.proved_but_unique) for k, p in numbered)
 
     def save(self, path: Any) -> None:
         """Write the certificates of all printed orbits and events, and its tubes, for ``contfric verify``.
@@ -206,14 +209,21 @@ def certify_branch(
     for orbit in branch:
         if time.time() > until:
             break
-        points.append(orbit.certify())
+        points.append(certify_orbit(orbit, inside=False))
     with working(_BITS):
         tracer = Tracer(branch, proofs, until, points)
-        pieces, steps = [], len(branch) - 1
-        for k in range(steps):
-            pieces += tracer.step(k)
+        pieces, steps, k = list[Piece](), len(branch) - 1, 0
+        while k < steps:
+            found, k = tracer.step(k)
+            pieces += found
             if progress is not None:
-                progress(f"{branch.name}, step {k + 1} of {steps}, {tracer.count} boxes")
+                progress(f"{branch.name}, step {k} of {steps}, {tracer.count} boxes")
+    points = [
+        replace(point, admissible=Finding(Verdict.PROVED))  # all orbits of its box are
+        if k in tracer.obeying
+        else with_inequalities(point)
+        for k, point in enumerate(points)
+    ]
     held = frozenset(tracer.held)
     return BranchCertificate(
         branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs), held

@@ -148,6 +148,7 @@ class Chain:
         self.n = segments.states
         self.m = self.n + 1
         self.size = segments.count * self.m
+        self._moves: dict[int, tuple[list[Vector], Move]] = {}
 
     def joints(self, x: Vector) -> list[Vector]:
         """Return joints 0 .. N from the unknowns, the last one by the closure."""
@@ -169,7 +170,13 @@ class Chain:
         return [first[0] if self.segments.turn != 0.0 else arb(0), *state]
 
     def move(self, i: int, z: list[Vector]) -> Move:
-        """Return segment i of the chain with joints z."""
+        """Return segment i of the chain with joints z; that of the last ones asked for is kept."""
+        known = self._moves.get(i)
+        if known is None or known[0] is not z:
+            known = self._moves[i] = z, self._move(i, z)
+        return known[1]
+
+    def _move(self, i: int, z: list[Vector]) -> Move:
         model, named = self.model, self.segments.resets[i]
         t, y = z[i][0], z[i][1:]
         start, by_time = column(model.extended(t, y)), column(model.by_time(t, 1))

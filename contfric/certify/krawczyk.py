@@ -26,6 +26,8 @@ Equations = Callable[[Vector], tuple[Vector, arb_mat]]
 _STEPS = 8
 #: The thin box is this many times the last correction: a factor that leaves space for the second order.
 _THIN = 4
+#: Most steps of Newton's method with one inverse: each adds as many digits as the Jacobian changes little.
+_SIMPLE = 16
 #: How often the thin box is widened sixteenfold where it was too narrow for rounding.
 _WIDER = 6
 
@@ -40,12 +42,14 @@ class Inclusion:
     zero : an enclosure of it, if it was found
     inverse : the approximate inverse that was used; None if the Jacobian could not be inverted
     why : what kept it from a proof; empty if nothing did
+    share : bound of ``|I - C J|``, in the norm in which the box is the unit ball
     """
 
     verdict: Verdict
     zero: Vector
     inverse: arb_mat | None = None
     why: str = ""
+    share: arb | None = None
 
 
 def approximate_inverse(jacobian: arb_mat) -> arb_mat | None:
@@ -60,7 +64,11 @@ def approximate_inverse(jacobian: arb_mat) -> arb_mat | None:
 
 
 def krawczyk(
-    equations: Equations, centre: Vector, radii: Vector, inverse: arb_mat | None = None
+    equations: Equations,
+    centre: Vector,
+    radii: Vector,
+    inverse: arb_mat | None = None,
+    at_centre: tuple[Vector, arb_mat] | None = None,
 ) -> Inclusion:
     """Look for the zero in a box.
 
@@ -69,8 +77,9 @@ def krawczyk(
     centre : exact numbers
     radii : the half-widths of the box
     inverse : approximate inverse of the Jacobian at the centre; computed where it is not given
+    at_centre : residual and Jacobian there, if they are known
     """
-    residual, jacobian = equations(centre)
+    residual, jacobian = at_centre or equations(centre)
     if inverse is None:
         inverse = approximate_inverse(jacobian)
     if inverse is None:
@@ -80,16 +89,52 @@ def krawczyk(
     offset = column([arb(0, r.abs_upper()) for r in radii])
     size = len(centre)
     identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
-    image = (identity - inverse * wide) * offset - inverse * column(residual)
-    moved = numbers(image)
+    spread = (identity - inverse * wide) * offset
+    moved = numbers(spread - inverse * column(residual))
     if all(k.abs_upper() < r.abs_lower() for k, r in zip(moved, radii, strict=True)):
         zero = [c + k for c, k in zip(centre, moved, strict=True)]
-        return Inclusion(Verdict.PROVED, zero, inverse)
+        return Inclusion(Verdict.PROVED, zero, inverse, share=_weighted(numbers(spread), radii))
     if any(
         k.is_finite() and k.abs_lower() > r.abs_upper() for k, r in zip(moved, radii, strict=True)
     ):
         return Inclusion(Verdict.REFUTED, [], inverse, "the box holds no zero")
     return Inclusion(Verdict.UNDECIDED, [], inverse, "the Jacobian changes too much over the box")
+
+
+def _weighted(values: Vector, radii: Vector) -> arb:
+    """Return a bound of the largest modulus, each over its half-width."""
+    shares = (abs(v).upper() / r.abs_lower() for v, r in zip(values, radii, strict=True))
+    return max((share.upper() for share in shares), key=float)
+
+
+def narrowed(
+    residual: Callable[[Vector], Vector], found: Inclusion, centre: Vector, radii: Vector
+) -> Vector | None:
+    """Return a narrow enclosure of the only zero of a box, from residuals alone; None if there is none.
+
+    For c in the box, ``x - c = (I - C J)(x - c) - C G(c)`` with J in the Jacobians of the box. In the norm
+    in which that is the unit ball, ``|x - c| <= |C G(c)| / (1 - share)``.
+
+    Parameters
+    ----------
+    found : what Krawczyk's operator has shown of the box
+    centre, radii : the box
+    """
+    if found.inverse is None or found.share is None or not found.share < 1:
+        return None
+    x, last = [c.mid() for c in found.zero], None
+    for _ in range(_SIMPLE):
+        step = numbers(found.inverse * column(residual(x)))
+        size = _weighted(step, radii)
+        if last is not None and not size < last / 2:
+            break
+        x, last = [(c - s).mid() for c, s in zip(x, step, strict=True)], size
+    else:
+        return None
+    error = size / (1 - found.share)
+    zero = [around(c, error * r) for c, r in zip(x, radii, strict=True)]
+    within = zip(zero, centre, radii, strict=True)
+    return zero if all(abs(z - c) < r for z, c, r in within) else None
 
 
 def refined(equations: Equations, start: Vector) -> tuple[Vector, Vector] | None:

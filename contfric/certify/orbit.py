@@ -2,8 +2,8 @@
 
 1. Interval Newton (:mod:`contfric.certify.krawczyk`) on the chain of segments, in a box around the printed
    joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.
-2. The same in a thin box around the limit of Newton's method in many digits: the solution is known to
-   1e-30.
+2. Within that box Newton's method goes on in many digits: its last residual bounds how far the solution is
+   from it, to 1e-30. (Where the first box fails: interval Newton in a thin one around the limit.)
 3. With that, every inequality over every segment, and the multipliers. What is not decided is tried again
    with twice the digits.
 
@@ -16,6 +16,7 @@ The stated error of the joints is what rounding of the flow and the residual do 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from flint import acb, arb, arb_mat
@@ -25,7 +26,7 @@ from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.inequalities import inequalities
 from contfric.certify.kept import Kept, kept_by_chain, with_kept
-from contfric.certify.krawczyk import Inclusion, approximate_inverse, enclosed, krawczyk
+from contfric.certify.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
 from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.certify.zeros import zeros_at_joints
@@ -46,8 +47,16 @@ _SMALLEST = 16
 _FAMILY = "it is one of a family of orbits, and it is not known exactly what a contact keeps"
 
 
-def certify_orbit(orbit: Orbit) -> Certificate:
+#: Of an orbit whose inequalities are for others to show.
+NOT_YET = Finding(Verdict.UNDECIDED, "not looked at")
+
+
+def certify_orbit(orbit: Orbit, inside: bool = True) -> Certificate:
     """Prove what can be proved of an orbit.
+
+    Parameters
+    ----------
+    inside : whether its inequalities are looked at; else the finding on them is NOT_YET
 
     Raises
     ------
@@ -65,11 +74,30 @@ def certify_orbit(orbit: Orbit) -> Certificate:
     found: Certificate | None = None
     for bits in _BITS:
         with working(bits):
-            found = _attempt(orbit, segments, bits)
-        if found.proved or Verdict.REFUTED in (found.exists.verdict, found.admissible.verdict):
+            found = _attempt(orbit, segments, bits, inside)
+        if _is_proved(found) or Verdict.REFUTED in (found.exists.verdict, found.admissible.verdict):
             break
     assert found is not None
     return found
+
+
+def with_inequalities(found: Certificate) -> Certificate:
+    """Return a certificate with the finding on the inequalities, if they were not looked at."""
+    if found.admissible is not NOT_YET:
+        return found
+    orbit, bits = found.orbit, found.precision
+    with working(bits):
+        chain = Chain(segments_of(orbit.system), ball_model(orbit.model, orbit.params))
+        found = replace(found, admissible=_obeys(orbit, chain, chain.joints(found.enclosure)))
+    undecided = found.admissible.verdict is Verdict.UNDECIDED and bits < _BITS[-1]
+    return certify_orbit(orbit) if undecided else found
+
+
+def _is_proved(found: Certificate) -> bool:
+    """Tell whether all is proved that was looked at."""
+    if found.admissible is NOT_YET:
+        found = replace(found, admissible=Finding(Verdict.PROVED))
+    return found.proved
 
 
 def provable_form(orbit: Orbit) -> Orbit:
@@ -89,6 +117,14 @@ def equations_of(
     return residual, arb_mat(rows)
 
 
+def residual_of(
+    segments: Segments, model: BallModel, kept: list[Kept], printed: Vector, x: Vector
+) -> Vector:
+    """Return the residual of :func:`equations_of`."""
+    residual = Chain(segments, model).residual(x)
+    return with_kept(residual, [[]] * len(residual), kept, x, printed)[0]
+
+
 def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
     """Return how well each joint of an orbit is known, by its own account."""
     size = 1.0 + float(abs(orbit.joints).max())
@@ -99,68 +135,71 @@ def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
     ]
 
 
-def _attempt(orbit: Orbit, segments: Segments, bits: int) -> Certificate:
+def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certificate:
     model = ball_model(orbit.model, orbit.params)
     printed = [arb(float(x)) for x in orbit.joints.ravel()]
     kept = kept_by_chain(segments, model)
     equations = partial(equations_of, segments, model, kept, printed)
-    inverse = approximate_inverse(equations(printed)[1])
+    at_printed = equations(printed)
+    inverse = approximate_inverse(at_printed[1])
     if inverse is None:
         return _nothing(orbit, _singular(orbit, "at the printed joints"), bits)
     radii = [_WIDE * e for e in stated_error(orbit, inverse)]
-    box = krawczyk(equations, printed, radii, inverse)
+    box = krawczyk(equations, printed, radii, inverse, at_printed)
     if box.verdict is Verdict.REFUTED:
         return _nothing(
             orbit, "no solution so near to the printed joints", bits, Verdict.REFUTED, radii
         )
-    thin = enclosed(equations, printed, arb(2) ** (_SPARE - bits))
-    if thin.verdict is not Verdict.PROVED:
-        return _nothing(orbit, _singular(orbit, "to working precision"), bits)
-    inside = all(abs(x - p) < r for x, p, r in zip(thin.zero, printed, radii, strict=True))
+    residual = partial(residual_of, segments, model, kept, printed)
+    zero = narrowed(residual, box, printed, radii)
+    if zero is None:
+        thin = enclosed(equations, printed, arb(2) ** (_SPARE - bits))
+        if thin.verdict is not Verdict.PROVED:
+            return _nothing(orbit, _singular(orbit, "to working precision"), bits)
+        zero = thin.zero
+    within = all(abs(x - p) < r for x, p, r in zip(zero, printed, radii, strict=True))
     exists = Finding(Verdict.PROVED)
-    if not inside:
+    if not within:
         exists = Finding(Verdict.UNDECIDED, "the solution is not within the stated error")
     unique = Finding(box.verdict)
     if not unique.proved:
         unique = Finding(
             Verdict.UNDECIDED, "the equations are nearly singular over the stated error"
         )
-    chain = Chain(segments, model)
-    return _with_solution(orbit, chain, kept, thin, exists, unique, radii, bits)
+    chain, admissible = Chain(segments, model), NOT_YET
+    joints = chain.joints(zero)
+    if inside:
+        admissible = _obeys(orbit, chain, joints)
+    discs, stable = _stability(orbit, chain, kept, joints)
+    return Certificate(
+        orbit, exists, unique, admissible, stable, radii, zero, discs, bits, len(kept)
+    )
 
 
 def _singular(orbit: Orbit, where: str) -> str:
     return _FAMILY if len(orbit.system.layout.conserved) else f"the equations are singular {where}"
 
 
-def _with_solution(
-    orbit: Orbit,
-    chain: Chain,
-    kept: list[Kept],
-    thin: Inclusion,
-    exists: Finding,
-    unique: Finding,
-    radii: Vector,
-    bits: int,
-) -> Certificate:
-    segments, model = chain.segments, chain.model
-    joints = chain.joints(thin.zero)
-    closing = closing_of(segments, model, orbit.system.half)
-    admissible = all_of(
-        [found.named(orbit.system) for found in inequalities(chain, orbit.system, joints, closing)]
-    )
-    discs: list[acb] = []
-    stable = Finding(Verdict.REFUTED, "the least disturbance ends a hold")
-    if not orbit.system.holds:
-        stable = Finding(Verdict.UNDECIDED, "a stop may be tangential")
-        known = zeros_at_joints(segments, model, closing)
-        matrix = poincare_map(chain, joints, known, [one.row for one in kept])
-        if matrix is not None:
-            discs = turn_multipliers(matrix, orbit.model.directions - len(kept))
-            stable = stability(discs)
-    return Certificate(
-        orbit, exists, unique, admissible, stable, radii, thin.zero, discs, bits, len(kept)
-    )
+def _obeys(orbit: Orbit, chain: Chain, joints: list[Vector]) -> Finding:
+    """Return whether the solution with joints in some balls obeys every inequality."""
+    closing = closing_of(chain.segments, chain.model, orbit.system.half)
+    every = inequalities(chain, orbit.system, joints, closing)
+    return all_of([found.named(orbit.system) for found in every])
+
+
+def _stability(
+    orbit: Orbit, chain: Chain, kept: list[Kept], joints: list[Vector]
+) -> tuple[list[acb], Finding]:
+    """Return discs of the multipliers of the solution with such joints, and whether it is stable."""
+    if orbit.system.holds:
+        return [], Finding(Verdict.REFUTED, "the least disturbance ends a hold")
+    closing = closing_of(chain.segments, chain.model, orbit.system.half)
+    known = zeros_at_joints(chain.segments, chain.model, closing)
+    matrix = poincare_map(chain, joints, known, [one.row for one in kept])
+    if matrix is None:
+        return [], Finding(Verdict.UNDECIDED, "a stop may be tangential")
+    discs = turn_multipliers(matrix, orbit.model.directions - len(kept))
+    return discs, stability(discs)
 
 
 def _nothing(

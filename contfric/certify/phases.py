@@ -10,6 +10,7 @@ what they are.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 from flint import arb, arb_mat
 
@@ -62,23 +63,31 @@ def _slopes(model: BallModel, slopes: BallModel, scale: arb, change: arb) -> Bal
     return replace(slopes, frequencies=still, fields=fields, period=arb(0), slopes=bend)
 
 
-def _scaled(model: BallModel, field: arb_mat, scale: arb) -> arb_mat:
-    """Return the field by phase: its rows of the states scaled, those of the harmonics whole numbers."""
-    found = arb_mat(model.size, model.size)
-    for a in range(model.states):
-        for b in range(model.size):
-            found[a, b] = field[a, b] * scale
-    for k, n in enumerate(model.turns):
-        at = model.states + 1 + 2 * k
+@cache
+def _only_states(states: int, size: int) -> arb_mat:
+    """Return the matrix that keeps the rows of the states."""
+    return arb_mat([[int(a == b < states) for b in range(size)] for a in range(size)])
+
+
+@cache
+def _harmonics(states: int, turns: tuple[int, ...]) -> arb_mat:
+    """Return the rows of the harmonics by phase: whole numbers."""
+    found = arb_mat(*[states + 1 + 2 * len(turns)] * 2)
+    for k, n in enumerate(turns):
+        at = states + 1 + 2 * k
         found[at, at + 1], found[at + 1, at] = arb(-n), arb(n)
     return found
 
 
+def _scaled(model: BallModel, field: arb_mat, scale: arb) -> arb_mat:
+    """Return the field by phase: its rows of the states scaled, those of the harmonics whole numbers."""
+    own = _only_states(model.states, model.size) * field * scale
+    return own + _harmonics(model.states, tuple(model.turns))
+
+
 def _sum(states: int, parts: list[tuple[arb_mat, arb]]) -> arb_mat:
     """Return a sum of fields times factors, its rows of the states only."""
-    size = parts[0][0].nrows()
-    found = arb_mat(size, size)
-    for a in range(states):
-        for b in range(size):
-            found[a, b] = sum((matrix[a, b] * factor for matrix, factor in parts), arb(0))
-    return found
+    total = arb_mat(parts[0][0].nrows(), parts[0][0].nrows())
+    for matrix, factor in parts:
+        total += matrix * factor
+    return _only_states(states, total.nrows()) * total

@@ -106,13 +106,13 @@ class Strand:
         inner = np.flatnonzero(apart >= 0)
         return self.point(self.branch[int(inner[np.argmin(apart[inner])])])
 
-    def nearly_singular(self, points: Sequence[Certificate]) -> dict[int, Vector]:
-        """Return balls of those orbits that may not be alone within their stated error, by number."""
+    def enclosed(self, points: Sequence[Certificate]) -> dict[int, Vector]:
+        """Return balls (z, p) of the printed orbits that are known in the chain of the branch, by number."""
         if self.whole:
             return {}
         found = {}
         for k, point in enumerate(points):
-            if point.proved or not point.proved_but_unique:
+            if not point.enclosure or point.orbit.system is not self.branch[k].system:
                 continue
             value, m = arb(float(self.branch.values[k])), self.segments.states + 1
             period = self._model(value).period

@@ -31,6 +31,11 @@ HALVINGS = 12
 #: A box is tried only if it is at most this much longer than the last one that was proved; and, if fewer than
 #: some were proved since one was not, if it is hardly longer: lengths are halves of each other.
 _GROWTH, _STEADY, _SLOW = 2.5, 4, 1.5
+#: A box reaches over several steps of the branch if the last one was about as long; or if, after so many at
+#: most, it may be longer.
+_SAME, _PATIENT = 1.2, 32
+#: Largest share of its rate that the ball of the rate of the parameter is to be, in boxes towards a BP or PD.
+_TURNS = 0.8
 #: After so many boxes it is tried again whether they are found at once, by the half-widths of the last one.
 _AGAIN = 8
 #: Most parts of a box in which its inequalities are looked at.
@@ -68,10 +73,15 @@ class Tracer(Strand):
         self.count, self.ended, self.length = 0, "", math.inf
         self._known: tuple[int, Vector | None] = (-1, None)  # number of a point, and its orbit
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
+        # the last box that was proved, and how many in a row before one of several steps is tried
+        self.proved_length, self.patience = 0.0, _STEADY
+        self.turning = False  # whether a box could not show that the parameter is monotone
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
-        self.near = self.nearly_singular(points)
+        self.printed_orbits = self.enclosed(points)
+        self.unique = {k for k, point in enumerate(points) if point.unique.proved}
         self.held: set[int] = set()
+        self.obeying: set[int] = set()
         for flip in self.flips:
             if flip is not None:
                 self._hold(flip)
@@ -87,20 +97,73 @@ class Tracer(Strand):
                     return flip_at(self, turns, self.far_from(end))
         return None
 
-    def _hold(self, box: Box | Flip) -> None:
-        """Note which of these orbits are on the curve of a proved box."""
-        self.held |= {k for k, zero in self.near.items() if box.holds(zero)}
+    def _hold(self, box: Box | Flip, arcs: Arcs | None = None) -> None:
+        """Note which printed orbits are on the curve of a proved box, all of which is admissible.
+
+        Looked at are those that may not be alone within their stated error, which is large next to a PD or
+        BP; and, of those between two arclengths, whether they are admissible.
+        """
+        for k, zero in self.printed_orbits.items():
+            near = arcs is not None and arcs[0] <= self.branch.arc[k] <= arcs[1]
+            if (near or k not in self.unique) and box.holds(zero):
+                self.held.add(k)
+                if near:
+                    self.obeying.add(k)
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, k: int) -> list[Piece]:
-        """Cover the step from point k to the next one."""
-        printed = self.point(self.branch[k]), self.point(self.branch[k + 1])
-        arcs = (float(self.branch.arc[k]), float(self.branch.arc[k + 1]))
+    def step(self, k: int) -> tuple[list[Piece], int]:
+        """Cover the branch from point k to a later one; return its number, too.
+
+        That is the next one, or one that is about as far as the last box reached.
+        """
+        last = self._reached(k)
+        return self._step(k, last), last
+
+    def _reached(self, k: int) -> int:
+        """Return the last point up to which a box is tried from point k: one step, or more."""
+        arc, found = self.branch.arc, k + 1
+        grows = _GROWTH if self.steady >= self.patience else _SAME
+        most = grows * min(self.length, self.proved_length)
+        while not (self._is_special(k) or self._is_special(found)):
+            if arc[found + 1] - arc[k] > most:
+                break
+            found += 1
+        return found
+
+    def _is_special(self, k: int) -> bool:
+        """Tell whether there is no step from point k, or one that is not only covered with boxes."""
+        at, count = self.branch.arc, len(self.branch)
+        ends = ((0, k == 0), (-1, k + 2 == count))
+        if k + 1 >= count or any(there and self.has_edge(end) for end, there in ends):
+            return True
+        return any(
+            flip is not None and abs(at[k + 1 - end] - at[-end]) < self.far
+            for end, flip in enumerate(self.flips)
+        )
+
+    def _allowed(self) -> float:
+        """Return how long the next box may be.
+
+        Towards a BP or PD the rate of the parameter vanishes; relative to it, its ball grows with the square
+        of the length. Once a box could not show its sign, that says how long others may be.
+        """
+        most = (_GROWTH if self.steady >= _STEADY else _SLOW) * self.length
+        if self.turning and isinstance(self.last, Box) and self.last.monotone:
+            assert self.last.tangent is not None
+            rate = self.last.tangent[-1]
+            share = float((rate.rad() / abs(rate.mid())).upper())
+            wanted = self.proved_length * math.sqrt(_TURNS / share)
+            most = min(most, max(wanted, self.length / 2))
+        return most
+
+    def _step(self, k: int, j: int) -> list[Piece]:
+        printed = self.point(self.branch[k]), self.point(self.branch[j])
+        arcs = (float(self.branch.arc[k]), float(self.branch.arc[j]))
         if not self.goes_on():
             return [self._nothing(arcs, *printed)]
         plane = [b - a for a, b in zip(*printed, strict=True)]
-        exact = [self._exact(k, printed[0], plane), self._exact(k + 1, printed[1], plane)]
+        exact = [self._exact(k, printed[0], plane), self._exact(j, printed[1], plane)]
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
@@ -109,7 +172,7 @@ class Tracer(Strand):
                     return []
                 if inside[end]:
                     return join(self, flip, first, last, arcs, end == 1)
-        left = k == 0 and self.has_edge(0), k + 2 == len(self.branch) and self.has_edge(-1)
+        left = k == 0 and self.has_edge(0), j + 1 == len(self.branch) and self.has_edge(-1)
         if all(left):
             middle, between = self.middle(first, last), 0.5 * (arcs[0] + arcs[1])
             if middle is not None:
@@ -134,10 +197,10 @@ class Tracer(Strand):
         why = Finding(Verdict.UNDECIDED, self.ended) if self.ended else NO_BOX
         return Piece(*arcs, (float(first[-1].mid()), float(last[-1].mid())), False, why)
 
-    def middle(self, first: Vector, last: Vector) -> Vector | None:
-        """Return the orbit halfway between two others."""
+    def middle(self, first: Vector, last: Vector, share: float = 0.5) -> Vector | None:
+        """Return the orbit halfway between two others, or at another share of the way."""
         plane = [b - a for a, b in zip(first, last, strict=True)]
-        middle = [((a + b) / 2).mid() for a, b in zip(first, last, strict=True)]
+        middle = [(a + share * c).mid() for a, c in zip(first, plane, strict=True)]
         return solved(self.segments, self.build, self.plain, middle, plane)
 
     def _exact(self, k: int, printed: Vector, plane: Vector) -> Vector | None:
@@ -151,9 +214,9 @@ class Tracer(Strand):
         length = arcs[1] - arcs[0]
         splits = level < HALVINGS and length > self.shortest and self.goes_on()
         splits = splits and self.missed < _IN_ROW
-        grows = _GROWTH if self.steady >= _STEADY else _SLOW
-        if length > grows * self.length and splits:
-            halves = self._halves(first, last, arcs, level)
+        parts = math.ceil(min(length / self._allowed(), 2**HALVINGS)) if splits else 1
+        if parts > 1:
+            halves = self._halves(first, last, arcs, level, (parts // 2) / parts)
             if halves is not None:
                 return halves
         self.count += 1
@@ -168,10 +231,13 @@ class Tracer(Strand):
             piece = self.piece(box, arcs, (first[-1], last[-1]), admissible)
         whole = piece is not None and piece.proved and piece.decided
         if not (whole or refuted) and splits:
+            self.patience = min(2 * self.patience, _PATIENT) if level == 0 else self.patience
             self.length, self.steady = length / 2, 0
+            self.turning |= piece is not None and piece.folds == UNKNOWN and any(self.flips)
             halves = self._halves(first, last, arcs, level)
             if halves is not None:
                 return halves
+        self.proved_length = length if whole else self.proved_length
         self.length = max(self.length, length) if whole else math.inf
         self.steady = self.steady + 1 if whole else _STEADY
         self.missed = 0 if box is not None else self.missed + 1
@@ -239,18 +305,20 @@ class Tracer(Strand):
         """Return a piece with its link to the one before; from now on it is the last one."""
         before, self.last = self.last, box
         if piece.proved:
-            self._hold(box)
+            self._hold(box, None if piece.ends else (piece.start, piece.stop))
         if before is None:
             return piece
         if isinstance(before, Box):
             return replace(piece, linked=are_linked(self.segments, self.plain, before, box))
         return replace(piece, linked=box.holds(before))
 
-    def _halves(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece] | None:
-        point = self.middle(first, last)
+    def _halves(
+        self, first: Vector, last: Vector, arcs: Arcs, level: int, share: float = 0.5
+    ) -> list[Piece] | None:
+        point = self.middle(first, last, share)
         if point is None:
             return None
-        between = 0.5 * (arcs[0] + arcs[1])
+        between = arcs[0] + share * (arcs[1] - arcs[0])
         return [
             *self.cover(first, point, (arcs[0], between), level + 1),
             *self.cover(point, last, (between, arcs[1]), level + 1),

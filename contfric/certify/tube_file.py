@@ -95,13 +95,20 @@ class _GrowingTube:
         self.point, self.why = last, ""
         return True
 
-    def march(self, row: _Row) -> bool:
-        """Go on to a knot in as many boxes as it takes; tell whether it is reached."""
+    def march(self, row: _Row, further: bool = False) -> bool:
+        """Go on to a knot in as many boxes as it takes; tell whether it is reached.
+
+        Parameters
+        ----------
+        further : whether it goes on from there, so that a box shorter than half of the others is left out
+        """
         start, whole, done = self.rows[-1], math.dist(self.rows[-1], row), 0.0
-        while done < 1:
+        while done < 1 and not (further and (1 - done) * whole < 0.5 * self.length < math.inf):
             # not two because one would be a little too long
             boxes = math.ceil(min((1 - done) * whole / self.length - 0.1, 2**_HALVINGS)) or 1
             there = done + (1 - done) / boxes if boxes > 1 else 1.0
+            if further and boxes > 1:  # what is left of it belongs to the next ones
+                there = done + self.length / whole
             length = (there - done) * whole
             if self.step(_between(start, row, there)):
                 done, self.steady = there, self.steady + 1
@@ -182,7 +189,7 @@ def _runs(proof: BranchCertificate, until: float) -> list[_GrowingTube]:
         else:
             if run is None or not piece.linked:
                 run = _GrowingTube(_data(proof), a, until)
-            _on(proof, k, run, b)
+            _on(proof, k, run, b, _next(proof, rows, k) is not None)
         if run is not None and run not in runs:
             runs.append(run)
         run = None if run is None or run.why or run.ends[1] else run
@@ -209,12 +216,19 @@ def _goes_further(
     run: _GrowingTube,
 ) -> bool:
     """Tell whether a box of the checker may reach over a whole box of the proof into the next one."""
-    after = proof.pieces[k + 1] if k + 1 < len(rows) else None
-    ends = rows[k + 1] if after is not None and after.linked and not after.ends else None
-    if ends is None or proof.pieces[k].ends:
+    after = _next(proof, rows, k)
+    if after is None or proof.pieces[k].ends:
         return False
     most = run.length if run.length < math.inf else _REACH * run.longest
-    return math.dist(run.rows[-1], ends[1]) < most
+    return math.dist(run.rows[-1], after[1]) < most
+
+
+def _next(
+    proof: BranchCertificate, rows: list[tuple[_Row, _Row] | None], k: int
+) -> tuple[_Row, _Row] | None:
+    """Return the knots of the next box of the proof, if the tube goes on in it."""
+    after = proof.pieces[k + 1] if k + 1 < len(rows) else None
+    return rows[k + 1] if after is not None and after.linked and not after.ends else None
 
 
 def _kept(branch: Branch) -> tuple[float, float]:
@@ -264,11 +278,11 @@ def _from_end(
     return None
 
 
-def _on(proof: BranchCertificate, k: int, run: _GrowingTube, row: _Row) -> None:
+def _on(proof: BranchCertificate, k: int, run: _GrowingTube, row: _Row, further: bool) -> None:
     """Let a tube go on through a box of the proof, or to the end of the branch in it."""
     piece = proof.pieces[k]
     if not piece.ends:
-        run.march(row)
+        run.march(row, further)
     elif k == len(proof.pieces) - 1:
         ends = _ends(proof, piece)
         if not ends:

@@ -11,7 +11,7 @@ from flint import arb, arb_mat, ctx
 
 import contfric as cf
 from contfric.certify.multipliers import stability, turn_multipliers
-from contfric.certify.orbit import certify_orbit
+from contfric.certify.orbit import certify_orbit, with_inequalities
 from contfric.certify.sign import Path, positive, touched
 from contfric.certify.verdict import Verdict
 from contfric.certify.zeros import in_span
@@ -225,6 +225,45 @@ def test_fast_modes_are_halved_for_their_frequency_not_for_its_square() -> None:
         assert path.norm < 1.5 * w
         for offset in (1.01, 0.99):  # cos(w t) + offset
             assert positive(path, arb_mat([[1, 0, offset]]), 0, False).proved is (offset > 1)
+
+
+def test_states_at_pieces_are_those_of_the_exponential_and_hardly_wider() -> None:
+    """Products of flows over halves of a segment, against one exponential each; also of balls."""
+    rng = np.random.default_rng(5)
+    for width in (0.0, 1e-6):
+        field = arb_mat([[arb(float(x), width) for x in row] for row in rng.normal(size=(4, 4))])
+        start = arb_mat([[float(x)] for x in rng.normal(size=4)])
+        path = Path(field, start, arb(1.5))
+        for level, index in ((0, 0), (3, 0), (3, 5), (3, 6), (6, 63), (9, 300)):
+            time = path.duration * arb(2 * index + 1) / 2 ** (level + 1)
+            direct = ((field * time).exp() * start).entries()
+            for ours, other in zip(path.middle(level, index).entries(), direct, strict=True):
+                assert ours.overlaps(other)
+                assert ours.rad() < 4 * other.rad() + 1e-10
+
+
+def test_printed_orbits_of_a_branch_are_proved_as_they_are_alone() -> None:
+    """That they obey the law is read off the boxes that hold them, or looked at; never only said."""
+    branch = cf.continue_orbit(cf.find_orbit("coulomb", {"Omega": 0.5}), "Omega", (0.495, 0.505))
+    found = branch.certify()
+    assert found.points_proved == len(branch)
+    for orbit, point in zip(branch, found.points, strict=True):
+        alone = orbit.certify()
+        assert (point.exists, point.unique, point.stable) == (
+            alone.exists,
+            alone.unique,
+            alone.stable,
+        )
+        assert point.admissible == alone.admissible
+        assert all(a.overlaps(b) for a, b in zip(point.enclosure, alone.enclosure, strict=True))
+
+
+def test_inequalities_that_were_not_looked_at_are_not_proved() -> None:
+    """Where no box holds an orbit, they are looked at after its branch."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5})
+    found = certify_orbit(orbit, inside=False)
+    assert not found.proved and found.admissible.verdict is Verdict.UNDECIDED
+    assert with_inequalities(found).admissible.proved
 
 
 # ---------------------------------------------------------------------------- small parts

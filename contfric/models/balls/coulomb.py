@@ -8,6 +8,8 @@ Omega t)``; it rests while ``|x - f| <= S0`` (eqs. (1), (2) and (6) of the refer
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 
 from flint import arb, arb_mat
 
@@ -28,12 +30,19 @@ def coulomb_balls(params: Mapping[str, arb], free: str | None = None) -> BallMod
     two_pi = 2 * arb.pi()
     slopes = None
     if free is not None:
-        unit = {name: arb(1 if name == free else 0) for name in params}
         period = -two_pi / (omega * omega) if free == "Omega" else arb(0)
-        none = dict.fromkeys(params, arb(0))  # all is linear, but for the period
-        second = _model(none, arb(0), arb(0), harmonics, -2 * period / omega)
-        slopes = _model(unit, unit["h"], arb(0), harmonics, period, second)
+        names = tuple(params)
+        # all is linear, but for the period
+        second = replace(_derivative(names, "", harmonics), period=-2 * period / omega)
+        slopes = replace(_derivative(names, free, harmonics), period=period, slopes=second)
     return _model(params, h, arb(1), harmonics, two_pi / omega, slopes)
+
+
+@cache
+def _derivative(names: tuple[str, ...], free: str, harmonics: int) -> BallModel:
+    """Return the derivative of all matrices by a parameter, exact numbers; zero by none."""
+    unit = {name: arb(int(name == free)) for name in names}
+    return _model(unit, unit["h"], arb(0), harmonics, arb(0))
 
 
 def _model(
