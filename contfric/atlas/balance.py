@@ -235,7 +235,7 @@ def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterato
         (position, k)
         for k, node in enumerate(diagram.nodes)
         if i in node.branches and node.bifurcation.kind is not Kind.T
-        for position, _ in _positions(diagram, node, branch)
+        for position in _positions(diagram, node, branch)
     )
     for (a, one), (b, other) in pairwise(locations):
         ends = (diagram.nodes[k].bifurcation.params[diagram.parameter] for k in (one, other))
@@ -253,20 +253,20 @@ def _families(
         branch = diagram.branches[i]
         if is_continuum(branch):
             continue
-        for position, _ in _positions(diagram, node, branch):
+        for position in _positions(diagram, node, branch):
             for way in (-1, 1):
                 found = _beside(branch, position, way, value, slack, width)
                 if found is not None:
                     yield found
 
 
-def _positions(diagram: Diagram, node: Node, branch: Branch) -> list[tuple[float, Bifurcation]]:
-    """Return the locations along a branch at which it meets an event, and the event as the branch has it."""
+def _positions(diagram: Diagram, node: Node, branch: Branch) -> list[float]:
+    """Return the locations along a branch at which it meets an event."""
     width = diagram.range[1] - diagram.range[0]
     b = node.bifurcation
     images = (b, b.mirror()) if branch.mirrored and b.orbit.model.symmetry is not None else (b,)
     return [
-        (_position(branch, e), e)
+        _position(branch, e)
         for e in branch.bifurcations
         if any(same_event(e, image, diagram.parameter, width) for image in images)
     ]
@@ -279,12 +279,7 @@ def _position(branch: Branch, event: Bifurcation) -> float:
 
 
 def _beside(
-    branch: Branch,
-    position: float,
-    way: int,
-    value: float,
-    slack: float,
-    width: float,
+    branch: Branch, position: float, way: int, value: float, slack: float, width: float
 ) -> tuple[int, Orbit] | None:
     """Return an orbit of a branch on one side of an event, before the branch meets the next one."""
     others = [(_position(branch, e), e) for e in branch.bifurcations if e.kind is not Kind.T]
@@ -321,8 +316,8 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
     if not length > 0.0:
         return None
     one, guess, other = (branch.between(float(a)) for a in (arcs[k - 1], arc, arcs[k]))
-    settings = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
-    settings = replace(settings, width=width)
+    own = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
+    settings = replace(own, width=width)
     chord = (other.joints - one.joints) / length
     point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)
