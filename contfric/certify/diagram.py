@@ -166,7 +166,7 @@ def prove(
         return None
     if isinstance(task.what, Branch):
         return certify_branch(task.what, until=task.until, progress=progress)
-    return certify_event(task.what, task.parameter)
+    return certify_event(task.what, task.parameter, task.until)
 
 
 def _written(

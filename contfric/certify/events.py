@@ -8,6 +8,8 @@ falls (SS), a touch has a second derivative.
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -127,12 +129,15 @@ class EventCertificate(Shown):
         return f"<{self.event.label} at {self.parameter} = {text}: {self.why or 'proved'}>"
 
 
-def certify_event(event: Bifurcation, parameter: str = "") -> EventCertificate:
+def certify_event(
+    event: Bifurcation, parameter: str = "", until: float = math.inf
+) -> EventCertificate:
     """Prove what can be proved of an event.
 
     Parameters
     ----------
     parameter : that is free; by default the one along which the event was located
+    until : by ``time.time``; after it an attempt that fails is not repeated with more digits
 
     Raises
     ------
@@ -160,7 +165,7 @@ def certify_event(event: Bifurcation, parameter: str = "") -> EventCertificate:
     for bits in _BITS:
         with working(bits):
             found = _attempt(event, location, parameter, bits)
-        if found.proved:
+        if found.proved or time.time() > until:
             break
     assert found is not None
     return found
