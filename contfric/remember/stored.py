@@ -19,6 +19,11 @@ from typing import Any, Literal
 import numpy as np
 
 _PACKAGE = "contfric"
+#: Names that classes had when files were written, and have now.
+_RENAMED = {
+    "contfric.continuation.events:Verdict": "contfric.continuation.events:Decision",
+    "contfric.equilibria.regions:Region": "contfric.equilibria.regions:ModeRegion",
+}
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.
 _MANY = 8
 #: What arrays of one column have in common.
@@ -303,12 +308,15 @@ def _path(kind: type) -> str:
 
 
 def _class(path: str, base: type) -> Any:
-    module, _, name = path.partition(":")
+    module, _, name = _RENAMED.get(path, path).partition(":")
     if module.split(".")[0] != _PACKAGE:
         raise TypeError(f"{path} is no class of {_PACKAGE}")
-    found: Any = import_module(module)
-    for part in name.split("."):
-        found = getattr(found, part)
+    try:
+        found: Any = import_module(module)
+        for part in name.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError):
+        raise TypeError(f"{path} is of another version of {_PACKAGE}") from None
     if not (isinstance(found, type) and issubclass(found, base)):
         raise TypeError(f"{path} is no such class")
     return found

@@ -14,6 +14,7 @@ import pytest
 import contfric as cf
 from contfric.cli import main
 from contfric.cli.exits import Exit
+from contfric.continuation.events import Decision
 from contfric.continuation.points import Point
 from contfric.remember import journal
 from contfric.remember.journal import Journal, keeping, remembered
@@ -300,3 +301,16 @@ def test_nothing_but_data_classes_of_the_package_is_made(node) -> None:
     tree = json.dumps(node).encode()
     with pytest.raises(UnstorableError):
         Reader(len(tree).to_bytes(8, "little") + tree).value()
+
+
+@pytest.mark.parametrize("name", ["Verdict", "Nothing"])
+def test_what_was_written_under_an_earlier_name_of_a_class_is_read(name: str) -> None:
+    content = Writer().bytes_of(Decision.KNOWN)
+    tree = content[8:].replace(b"events:Decision", f"events:{name}".encode())
+    assert tree != content[8:]
+    reader = Reader(len(tree).to_bytes(8, "little") + tree)
+    if name == "Verdict":
+        assert reader.value() is Decision.KNOWN
+        return
+    with pytest.raises(UnstorableError, match="another version of contfric"):
+        reader.value()
