@@ -12,6 +12,7 @@ from contfric.models.check.probe import Probe
 from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
+from contfric.orbit.entered import Place, entered_domain
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import bits_of
 
@@ -42,7 +43,9 @@ def start_of(
     model: Model, t: float, y: FloatArray, vector: FloatArray, domain: str | None
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
-    signs = signs_at(model, t, y, vector)
+    place = Place(model, t, y, vector)
+    exact = signs_at(model, t, y, vector)
+    signs = exact | {k: 0 for k in exact if k not in model.settled_sides and place.lies_on(k)}
     given: object = domain  # whatever the user gave
     if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
         raise ParameterError(
@@ -50,8 +53,9 @@ def start_of(
         )
     name = (
         _at_phase(model, domain, signs)
-        or model.domain_of(signs, t, y, vector)
-        or _side_of_rates(model, t, y, vector, signs)
+        or (entered_domain(place, signs) if 0 in signs.values() else None)
+        or model.domain_of(exact, t, y, vector)
+        or _side_of_rates(model, t, y, vector, exact)
     )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
