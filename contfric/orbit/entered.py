@@ -1,12 +1,12 @@
 """The domain that a solution goes into from a state on surfaces, such as a joint of an orbit.
 
-A joint lies on its surfaces to rounding: which sides it is on says nothing. The solution is in a domain if that
-is on the sides of all other surfaces, and the solution of its mode keeps to its side of those that the state is
-on. The side is that of the first change of the observable that is more than rounding, so that a surface may
-be left with its rate, with the second power of time (a stop), or with the third (a wall that lets go).
+A joint lies on its surfaces to rounding: which sides it is on says nothing. The solution is in a domain
+if that is on the sides of all other surfaces, and the solution of its mode keeps to its side of those that
+the state is on. The side is that of the first change of the observable that is more than rounding, so
+that a surface may be left with its rate, or with the second or third power of time.
 
-Where several domains hold, one that stays on the surfaces comes first: at rest within the limits of the static
-force motion does not go on.
+Where several domains hold, one that stays on the surfaces comes first: at rest within the limits of the
+static force the solution does not go on.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from contfric.models.view import FlowView
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.time_scale import clock_period, time_scale
 
-#: A state lies on a surface within this share of what its observable is summed up from: Newton's method leaves
-#: some hundred roundings of a joint, an integrated one its tolerance (1e-12); two events differ by far more.
+#: A state lies on a surface within this share of what its observable is summed up from: Newton's method
+#: leaves some hundred roundings of a joint, an integrated flow its tolerance; two events differ by far more.
 _ON = 1e-12
-#: Shares of a period after which it is asked to which side an observable has moved, and the change that counts,
-#: against the same: a hundred roundings. Steps are as short as the change allows.
+#: Shares of a period after which it is asked to which side an observable has moved, and the change that
+#: counts, against the same: a hundred roundings. Steps are as short as the change allows.
 _STEPS, _MOVED = tuple(10.0**k for k in range(-8, -2)), 2e-14
 
 
@@ -90,9 +90,9 @@ class Place:
         bounds = cut_bounds(self.model)[domain.own_mode]
         for name, side in domain.signs.items():
             ends = self.model.cuts(name) or name in bounds
-            if side != 0 and ends and self.lies_on(name):
-                if self.side_ahead(domain.mode, name) == -side:
-                    return name
+            left = side != 0 and ends and self.lies_on(name)
+            if left and self.side_ahead(domain.mode, name) == -side:
+                return name
         return ""
 
 

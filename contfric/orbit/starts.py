@@ -52,7 +52,7 @@ def start_of(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
     name = (
-        _at_phase(model, domain, signs)
+        _at_phase(place, domain, signs)
         or (entered_domain(place, signs) if 0 in signs.values() else None)
         or model.domain_of(exact, t, y, vector)
         or _side_of_rates(model, t, y, vector, exact)
@@ -67,13 +67,16 @@ def start_of(
     return model.mode_index[mode], on
 
 
-def _at_phase(model: Model, domain: str | None, signs: dict[str, int]) -> str | None:
-    """Return the domain that a user names, on the side of the phase that the time is on.
+def _at_phase(place: Place, domain: str | None, signs: dict[str, int]) -> str | None:
+    """Return the domain that a user names, on the side of the phase that the time is on or goes on to.
 
     A mode that the phase divides has its own name on the first side only.
     """
-    side = signs.get(model.phase, 0) if domain else 0
-    if domain is None or side == 0:
+    model = place.model
+    if domain is None or not model.phase:
+        return domain
+    side = signs[model.phase] or place.side_ahead(model.domain_by_name[domain].mode, model.phase)
+    if side == 0:
         return domain
     if model.domain_by_name[domain].signs.get(model.phase, side) == side:
         return domain
