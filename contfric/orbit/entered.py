@@ -97,22 +97,27 @@ class Place:
 
 
 def entered_domain(place: Place, signs: Mapping[str, int]) -> str | None:
-    """Return the domain that the solution goes into; None if none is found.
+    """Return the domain that the solution goes into; None if none is found, or the state is on no surface.
 
     Parameters
     ----------
     signs : sides of all surfaces, 0 of those that the state lies on
     """
+    if 0 not in signs.values():
+        return None
     if isinstance(place.model, ComposedModel):
         return _composed(place.model, place, signs)
     return next((d.name for d in _likely(place, signs) if not place.left_by(d)), None)
 
 
 def _likely(place: Place, signs: Mapping[str, int]) -> Iterator[Domain]:
-    """Yield the domains next to a state, those first that lie on most of its surfaces."""
+    """Yield the domains next to a state, those first that lie on most of its surfaces.
+
+    Chatter is none of them: impacts of any speed begin on its wall.
+    """
     model = place.model
     first = model.domain_of(signs, place.t, place.y, place.vector)
-    if first is not None:
+    if first is not None and model.domain_by_name[first].own_mode not in model.chatter_by_mode:
         yield model.domain_by_name[first]
     beside = [
         d

@@ -51,11 +51,12 @@ def start_of(
         raise ParameterError(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
+    named = _at_phase(place, domain, signs)
+    name = named or entered_domain(place, signs)
+    if name is None or (named and place.left_by(model.domain_by_name[named])):
+        signs = exact  # a surface that is met at once is not one that the start leaves
     name = (
-        _at_phase(place, domain, signs)
-        or (entered_domain(place, signs) if 0 in signs.values() else None)
-        or model.domain_of(exact, t, y, vector)
-        or _side_of_rates(model, t, y, vector, exact)
+        name or model.domain_of(exact, t, y, vector) or _side_of_rates(model, t, y, vector, exact)
     )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")

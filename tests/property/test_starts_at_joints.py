@@ -88,6 +88,12 @@ def check_starts(orbit: cf.Orbit) -> None:
         found = cf.simulate(model, orbit.params, state=y, time=t, periods=length)
         order = [(j + i) % count for i in range(PERIODS * count)]
         expected, met = events([orbit.itinerary[k] for k in order]), events(found.itinerary)
+        if (
+            orbit.itinerary[j][0] in model.chatter_by_mode
+        ):  # a few impacts come before it is known as one
+            known = next(i for i, (_, pair) in enumerate(met) if pair == expected[0][1])
+            assert all(s in {c.surface for c in model.chatters} for _, (_, s) in met[:known])
+            met = met[known:]
         assert [pair for _, pair in met[: len(expected)]] == [pair for _, pair in expected], (
             j,
             t,
