@@ -108,9 +108,9 @@ def _limit_side(
 ) -> int:
     """Return the side that sliding on a surface is left to at one of its limits; 0 if that is not clear.
 
-    Sliding ends where the field of one side turns, while that of the other still leads to the surface: the
-    rate of that side is zero all over the limit, so that it may be asked anywhere on it. Where the rate jumps
-    (a static limit above the kinetic one) it is asked where the mode holds.
+    Sliding ends where the field of one side leads to the surface no more, while that of the other still does:
+    its rate is zero at the limit, or has another sign (a static limit above the kinetic one). Places where
+    the mode holds tell; where no random state comes to one, all places at the limit, if they agree.
 
     Parameters
     ----------
@@ -120,20 +120,19 @@ def _limit_side(
     """
     if not all(beside):
         return 0
-    verdicts = set()
+    verdicts: dict[bool, set[int]] = {True: set(), False: set()}
     others = {name: side for name, side in known.items() if name not in pair}
     for other in (sampler, _moved(sampler)):
         places = (_both_met(other, pair, t, y) for t, y in other.states(_TRIES))
         for place in itertools.islice(filter(None, places), _PLACES):
             modes = zip((1, -1), beside, strict=True)
-            outward = {s: s * other.rate(mode, pair[0], s, *place) for s, mode in modes}
-            inward = [s for s, rate in outward.items() if rate < -_STILL]
-            if len(inward) != 1:
+            outward = [(s * other.rate(mode, pair[0], s, *place), s) for s, mode in modes]
+            inward = [side for rate, side in outward if rate < -_STILL]
+            if len(inward) != 1 or not all(np.isfinite(outward).flat):
                 continue
-            away = -inward[0]
-            if outward[away] <= _STILL or other.sides(*place, others) == others:
-                verdicts.add(away)
-    return verdicts.pop() if len(verdicts) == 1 else 0
+            verdicts[other.sides(*place, others) == others].add(-inward[0])
+    told = verdicts[True] or verdicts[False]
+    return told.pop() if len(told) == 1 else 0
 
 
 def _both_met(
