@@ -77,7 +77,7 @@ def test_sliding_is_left_to_the_side_to_which_both_fields_lead(
     own, rng = Capsule(seed, static), np.random.default_rng(seed)
     model = typed(tmp_path, own.text)
     view, seen = FlowView(model, model.vector({})), set()
-    for x, v in zip(rng.uniform(-3.0, 3.0, 200), rng.uniform(-40.0, 40.0, 200), strict=True):
+    for x, v in zip(rng.uniform(-0.5, 0.5, 200), rng.uniform(-40.0, 40.0, 200), strict=True):
         state, load, hit = np.array([x, v, 0.0]), own.load(x, v), x > own.params["de"]
         heights = {s.name: view.height(s.name, 0.5, state) for s in model.surfaces}
         signs = {n: int(np.sign(h)) for n, h in heights.items()} | {"still": 0}
