@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -27,8 +28,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if item.nodeid.startswith(starts):
             item.add_marker(pytest.mark.slow)
     if config.args == ["tests"]:
-        names = [item.nodeid for item in items]
-        stale = [line for line in starts if not any(name.startswith(line) for name in names)]
+        names = [*sorted(item.nodeid for item in items), ""]
+        stale = [s for s in starts if not names[bisect_left(names, s, hi=len(items))].startswith(s)]
         if stale:
             raise pytest.UsageError(f"long_tests.txt names no test in: {stale[0]}")
 

@@ -7,9 +7,13 @@ import random
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description
 from contfric.models.evaluate import Sampler
+from contfric.models.parts import Departure
+from contfric.models.regions import is_possible
 
 #: A rate this small, at a place that Newton's method found, is zero.
 _STILL = 1e-7
@@ -18,6 +22,8 @@ _PLACES, _TRIES = 6, 60
 #: States at which motion enters a mode that holds on both sides of where it does: of 40, one of a class of a
 #: tenth is missed in one of 70 models. From how many random states these are sought.
 _ENTERED, _STARTS = 40, 400
+#: Steps of Newton's method for a place on two surfaces: as many as double digits take from one to all.
+_STEPS = 10
 
 
 def departing_side(
@@ -43,6 +49,107 @@ def departing_side(
     if len(beside) == 2 and len(set(beside.values())) == 1 and (verdicts[1] or verdicts[-1]):
         return max((1, -1), key=verdicts.__getitem__)
     return next(iter(verdicts)) if len(verdicts) == 1 else 0
+
+
+def limit_departures(
+    sampler: Sampler,
+    surfaces: list[Surface],
+    domains: Sequence[Domain],
+    found: Sequence[Departure],
+) -> tuple[Departure, ...]:
+    """Return how sliding is left at its own limits, where departures that are found say something else.
+
+    Each of several sliding modes on one surface has limits of its own, and on which side of the limits of
+    another one a state is does not matter to it. So what was found beyond a surface between them (a wall that
+    a slider touches) does not tell where a limit is passed; and beyond a limit no random state may lie. At
+    the limit itself it is seen where motion goes (:func:`_limit_side`).
+    """
+    modes = {tuple(sorted(d.signs.items())): d.mode for d in domains}
+    own: dict[str, list[Domain]] = {}
+    for domain in domains:
+        own.setdefault(domain.mode, []).append(domain)
+    limits = []
+    for parts in own.values():
+        known = {n: v for n, v in parts[0].signs.items() if all(d.signs[n] == v for d in parts)}
+        on = [name for name, side in known.items() if side == 0]
+        for limit in [name for name, side in known.items() if side and len(on) == 1]:
+            through = {on[0]: 0, limit: -known[limit]}
+            regions = [{**d.signs, **through} for d in parts]
+            regions = [signs for signs in regions if is_possible(surfaces, signs)]
+            if any(tuple(sorted(signs.items())) in modes for signs in regions):
+                continue  # another mode slides on
+            first = [next((d for d in found if _holds(d, signs)), None) for signs in regions]
+            if all(d is not None and d.where == through for d in first):
+                continue  # they were asked of this limit
+            beside = [_beside(modes, regions, on[0], side) for side in (1, -1)]
+            left = _limit_side(sampler, known, (on[0], limit), beside)
+            if left and any(d is None or d.leaves != {on[0]: left} for d in first):
+                limits.append(Departure({**known, **through}, {on[0]: left}))
+    return tuple(limits)
+
+
+def _holds(departure: Departure, signs: Mapping[str, int]) -> bool:
+    return all(signs[name] == side for name, side in departure.where.items())
+
+
+def _beside(
+    modes: Mapping[tuple[tuple[str, int], ...], str],
+    regions: Sequence[Mapping[str, int]],
+    on: str,
+    side: int,
+) -> str:
+    """Return the mode on one side of a surface in some regions; nothing if it is not one."""
+    found = {modes.get(tuple(sorted({**signs, on: side}.items())), "") for signs in regions}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _limit_side(
+    sampler: Sampler, known: Mapping[str, int], pair: tuple[str, str], beside: Sequence[str]
+) -> int:
+    """Return the side that sliding on a surface is left to at one of its limits; 0 if that is not clear.
+
+    Sliding ends where the field of one side leads to the surface no more, while that of the other still does:
+    its rate is zero at the limit, or has another sign (a static limit above the kinetic one). Places where
+    the mode holds tell; where no random state comes to one, all places at the limit, if they agree.
+
+    Parameters
+    ----------
+    known : the sides of surfaces on which the sliding mode holds
+    pair : the surface, and the limit
+    beside : the modes above and below the surface, beyond the limit
+    """
+    if not all(beside):
+        return 0
+    verdicts: dict[bool, set[int]] = {True: set(), False: set()}
+    others = {name: side for name, side in known.items() if name not in pair}
+    for other in (sampler, _moved(sampler)):
+        places = (_both_met(other, pair, t, y) for t, y in other.states(_TRIES))
+        for place in itertools.islice(filter(None, places), _PLACES):
+            modes = zip((1, -1), beside, strict=True)
+            outward = [(s * other.rate(mode, pair[0], s, *place), s) for s, mode in modes]
+            inward = [side for rate, side in outward if rate < -_STILL]
+            if len(inward) != 1 or not all(np.isfinite(outward).flat):
+                continue
+            verdicts[other.sides(*place, others) == others].add(-inward[0])
+    told = verdicts[True] or verdicts[False]
+    return told.pop() if len(told) == 1 else 0
+
+
+def _both_met(
+    sampler: Sampler, pair: tuple[str, str], t: float, y: Sequence[float]
+) -> tuple[float, list[float]] | None:
+    """Return a place on two surfaces, near a time and state: Newton's method; None if none is found."""
+    place = np.array([t, *y])
+    for _ in range(_STEPS):
+        time, state = float(place[0]), place[1:].tolist()
+        if not any(sampler.sides(time, state, pair).values()):
+            return time, state
+        above = [sampler.evaluator.height(name, sampler.params, time, state) for name in pair]
+        slopes = np.array([sampler.gradient(name, time, state) for name in pair])
+        if not (np.all(np.isfinite(above)) and np.all(np.isfinite(slopes))):
+            return None
+        place -= np.linalg.lstsq(slopes, np.array(above), rcond=None)[0]
+    return None
 
 
 def turned_modes(

@@ -25,7 +25,7 @@ from contfric.models.definition import (
     Surface,
     Symmetry,
 )
-from contfric.models.departing import departing_side, leaves_at_rest, turned_modes
+from contfric.models.departing import departing_side, leaves_at_rest, limit_departures, turned_modes
 from contfric.models.description import Description, Range
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
@@ -249,7 +249,8 @@ def _departures(
             departure = _departure(sampler, on[0], surface, signs, beside)
             if departure is not None:
                 found[key] = departure
-    return tuple(found.values())
+    others = tuple(found.values())
+    return (*limit_departures(sampler, surfaces, domains, others), *others)
 
 
 def _departure(
