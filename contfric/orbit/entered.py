@@ -32,7 +32,7 @@ _STEPS, _MOVED = tuple(10.0**k for k in range(-8, -2)), 2e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class StartState:
     """A state at a time, and the surfaces that it lies on."""
 
     model: Model
@@ -96,7 +96,7 @@ class Place:
         return ""
 
 
-def entered_domain(place: Place, signs: Mapping[str, int]) -> str | None:
+def entered_domain(start: StartState, signs: Mapping[str, int]) -> str | None:
     """Return the domain that the solution goes into; None if none is found, or the state is on no surface.
 
     Parameters
@@ -105,18 +105,18 @@ def entered_domain(place: Place, signs: Mapping[str, int]) -> str | None:
     """
     if 0 not in signs.values():
         return None
-    if isinstance(place.model, ComposedModel):
-        return _composed(place.model, place, signs)
-    return next((d.name for d in _likely(place, signs) if not place.left_by(d)), None)
+    if isinstance(start.model, ComposedModel):
+        return _composed(start.model, start, signs)
+    return next((d.name for d in _likely(start, signs) if not start.left_by(d)), None)
 
 
-def _likely(place: Place, signs: Mapping[str, int]) -> Iterator[Domain]:
+def _likely(start: StartState, signs: Mapping[str, int]) -> Iterator[Domain]:
     """Yield the domains next to a state, those first that lie on most of its surfaces.
 
     Chatter is none of them: impacts of any speed begin on its wall.
     """
-    model = place.model
-    first = model.domain_of(signs, place.t, place.y, place.vector)
+    model = start.model
+    first = model.domain_of(signs, start.t, start.y, start.vector)
     if first is not None and model.domain_by_name[first].own_mode not in model.chatter_by_mode:
         yield model.domain_by_name[first]
     beside = [
@@ -128,30 +128,30 @@ def _likely(place: Place, signs: Mapping[str, int]) -> Iterator[Domain]:
     yield from sorted(beside, key=lambda d: -sum(side == 0 for side in d.signs.values()))
 
 
-def _composed(model: ComposedModel, place: Place, signs: Mapping[str, int]) -> str | None:
+def _composed(model: ComposedModel, start: StartState, signs: Mapping[str, int]) -> str | None:
     """Do the same where modes are made: from one to the next, as long as the solution leaves it at once."""
-    name = model.domain_of(signs, place.t, place.y, place.vector)
+    name = model.domain_of(signs, start.t, start.y, start.vector)
     for _ in range(2 * len(model.states)):
         if name is None:
             return None
-        surface = place.left_by(model.domain_by_name[name])
+        surface = start.left_by(model.domain_by_name[name])
         if not surface:
             return name
-        name = _following(model, place, signs, (name, surface))
+        name = _following(model, start, signs, (name, surface))
     return None
 
 
 def _following(
-    model: ComposedModel, place: Place, signs: Mapping[str, int], left: tuple[str, str]
+    model: ComposedModel, start: StartState, signs: Mapping[str, int], left: tuple[str, str]
 ) -> str | None:
     """Return the mode that follows where a solution leaves one."""
     if left in model.sections:
         return model.transitions[left]
     composition = model.composition
     if composition.is_solved(*left):
-        there = model.mapping(place.vector), place.t, place.y.tolist()
-        return model.part_at(composition.after(*left, there), place.t, place.y, place.vector)
+        there = model.mapping(start.vector), start.t, start.y.tolist()
+        return model.part_at(composition.after(*left, there), start.t, start.y, start.vector)
     for way in composition.ways(left[0])[left[1]]:
         if all(signs.get(name, 0) in (0, side) for name, side in way.where.items()):
-            return model.part_at(way.mode, place.t, place.y, place.vector)
+            return model.part_at(way.mode, start.t, start.y, start.vector)
     return None
