@@ -12,6 +12,7 @@ from contfric.models.check.probe import Probe
 from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
+from contfric.orbit.entered import StartState, entered_domain
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import bits_of
 
@@ -42,16 +43,20 @@ def start_of(
     model: Model, t: float, y: FloatArray, vector: FloatArray, domain: str | None
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
-    signs = signs_at(model, t, y, vector)
+    start = StartState(model, t, y, vector)
+    exact = signs_at(model, t, y, vector)
+    signs = exact | {k: 0 for k in exact if k not in model.settled_sides and start.lies_on(k)}
     given: object = domain  # whatever the user gave
     if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
         raise ParameterError(
             f"unknown domain {shown(given)}{did_you_mean(given, model.domain_by_name)}"
         )
+    named = _at_phase(start, domain, signs)
+    name = named or entered_domain(start, signs)
+    if name is None or (named and start.left_by(model.domain_by_name[named])):
+        signs = exact  # a surface that is met at once is not one that the start leaves
     name = (
-        _at_phase(model, domain, signs)
-        or model.domain_of(signs, t, y, vector)
-        or _side_of_rates(model, t, y, vector, signs)
+        name or model.domain_of(exact, t, y, vector) or _side_of_rates(model, t, y, vector, exact)
     )
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
@@ -63,13 +68,16 @@ def start_of(
     return model.mode_index[mode], on
 
 
-def _at_phase(model: Model, domain: str | None, signs: dict[str, int]) -> str | None:
-    """Return the domain that a user names, on the side of the phase that the time is on.
+def _at_phase(start: StartState, domain: str | None, signs: dict[str, int]) -> str | None:
+    """Return the domain that a user names, on the side of the phase that the time is on or goes on to.
 
     A mode that the phase divides has its own name on the first side only.
     """
-    side = signs.get(model.phase, 0) if domain else 0
-    if domain is None or side == 0:
+    model = start.model
+    if domain is None or not model.phase:
+        return domain
+    side = signs[model.phase] or start.side_ahead(model.domain_by_name[domain].mode, model.phase)
+    if side == 0:
         return domain
     if model.domain_by_name[domain].signs.get(model.phase, side) == side:
         return domain
