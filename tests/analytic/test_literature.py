@@ -246,9 +246,15 @@ def test_popp_of_period_one_folds_and_becomes_a_torus() -> None:
 
 
 def test_popp_has_each_orbit_once() -> None:
-    """Three events lead to the orbit of period 2 with a stick; twice around is no orbit of its own."""
+    """Three events lead to the orbit of period 2 with a stick; twice around is no orbit of its own.
+
+    Where it grazes, orbits of two and of four turns stick in one of them, too."""
     found = [b for b in diagram("popp").branches if b.name.startswith(("1a", "2a"))]
-    assert sorted((b.name, b[0].periods) for b in found) == [("1a, 5seg", 2), ("1a, 9seg", 4)]
+    assert sorted((b.name, b[0].periods) for b in found) == [
+        ("1a, 17seg", 8),
+        ("1a, 5seg", 2),
+        ("1a, 9seg", 4),
+    ]
     assert not diagram("popp").loose_ends
 
 
@@ -362,7 +368,7 @@ def test_bang_bang_is_found_from_one_start() -> None:
 
 
 def test_events_that_branches_share_are_listed_once() -> None:
-    """The grazing of the orbit of period 2 is met by three branches, one of which stops there."""
+    """The grazing of the orbit of period 2 is met by four branches, one of which stops there."""
     for name in ("popp", "impact-friction", "impact", "belt", "dead-band", "bang-bang"):
         found = diagram(name)
         events = [b for b in found.bifurcations if b.kind is not cf.Kind.T]
@@ -372,7 +378,12 @@ def test_events_that_branches_share_are_listed_once() -> None:
         n for n in diagram("popp").nodes if abs(n.bifurcation.params["omega"] - 1.66769) < 1e-5
     ]
     names = {diagram("popp").branches[i].name for i in node.branches}
-    assert node.bifurcation.kind is cf.Kind.GS and names == {"0a, 4seg", "1a, 5seg", "1a, 9seg"}
+    assert node.bifurcation.kind is cf.Kind.GS and names == {
+        "0a, 4seg",
+        "1a, 5seg",
+        "1a, 9seg",
+        "1a, 17seg",
+    }
     for branch in diagram("popp").branches:
         for end in branch.ends:
             assert end.bifurcation is None or end.reason.name == end.bifurcation.kind.value
