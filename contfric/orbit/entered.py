@@ -6,7 +6,8 @@ the state is on. The side is that of the first change of the observable that is 
 that a surface may be left with its rate, or with the second or third power of time.
 
 Where several domains hold, one that stays on the surfaces comes first: at rest within the limits of the
-static force the solution does not go on.
+static force the solution does not go on. A solution that would stand on the boundary of its domain (rest
+whose load stays at its limit) is the last choice, after what the signs say as they are.
 """
 
 from __future__ import annotations
@@ -87,27 +88,39 @@ class StartState:
 
     def left_by(self, domain: Domain) -> str:
         """Return a surface that the state lies on and the solution of a domain leaves it by; "" if none."""
-        bounds = cut_bounds(self.model)[domain.own_mode]
-        for name, side in domain.signs.items():
-            ends = self.model.cuts(name) or name in bounds
-            left = side != 0 and ends and self.lies_on(name)
-            if left and self.side_ahead(domain.mode, name) == -side:
+        for name, side in self._met(domain):
+            if self.side_ahead(domain.mode, name) == -side:
                 return name
         return ""
 
+    def stands(self, domain: Domain) -> bool:
+        """Tell whether the solution of a domain stays on a surface that ends it, as at an equilibrium."""
+        return any(not self.side_ahead(domain.mode, name) for name, _ in self._met(domain))
 
-def entered_domain(start: StartState, signs: Mapping[str, int]) -> str | None:
+    def _met(self, domain: Domain) -> Iterator[tuple[str, int]]:
+        """Yield the surfaces that end a domain and that the state lies on, and its side of each."""
+        bounds = cut_bounds(self.model)[domain.own_mode]
+        for name, side in domain.signs.items():
+            if side != 0 and (self.model.cuts(name) or name in bounds) and self.lies_on(name):
+                yield name, side
+
+
+def entered_domain(
+    start: StartState, signs: Mapping[str, int], standing: bool = False
+) -> str | None:
     """Return the domain that the solution goes into; None if none is found, or the state is on no surface.
 
     Parameters
     ----------
     signs : sides of all surfaces, 0 of those that the state lies on
+    standing : whether it may stand on the boundary of the domain
     """
     if 0 not in signs.values():
         return None
     if isinstance(start.model, ComposedModel):
         return _composed(start.model, start, signs)
-    return next((d.name for d in _likely(start, signs) if not start.left_by(d)), None)
+    likely = (d for d in _likely(start, signs) if not start.left_by(d))
+    return next((d.name for d in likely if standing or not start.stands(d)), None)
 
 
 def _likely(start: StartState, signs: Mapping[str, int]) -> Iterator[Domain]:

@@ -54,10 +54,11 @@ def start_of(
     named = _at_phase(start, domain, signs)
     name = named or entered_domain(start, signs)
     if name is None or (named and start.left_by(model.domain_by_name[named])):
-        signs = exact  # a surface that is met at once is not one that the start leaves
-    name = (
-        name or model.domain_of(exact, t, y, vector) or _side_of_rates(model, t, y, vector, exact)
-    )
+        met, signs = signs, exact  # a surface that is met at once is not one that the start leaves
+        name = name or model.domain_of(exact, t, y, vector)
+        name = name or _side_of_rates(model, t, y, vector, exact)
+        if name is None and (name := entered_domain(start, met, standing=True)):
+            signs = met
     if name is None:
         raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
     mode = model.domain_by_name[name].own_mode
