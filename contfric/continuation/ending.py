@@ -214,8 +214,8 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
             outcome_at(orbit.as_whole(), location, kind)
         except NoJump:
             return continuous
-        except NotationError:
-            continue
+        except NotationError:  # what is there instead is told by what follows
+            return ""
     return ""
 
 

@@ -88,13 +88,8 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
             side.notes.append(note)
         elif ends_at(orbit, side, bifurcation, point, settings):
             return True
-    reached = after if limit is None else limit[0]
-    if violates(reached):
-        side.drop_tip()
-        if is_at_limit(side.tip.value, settings):
-            side.end = limit_end(side.tip.value, settings)
-        elif not end_of_holds(orbit, side, settings, True):
-            side.end = End(EndReason.SINGULAR)
+    if fails:
+        _end_where_it_fails(orbit, side, settings)
         return True
     if limit is None:
         return False
@@ -103,6 +98,15 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
     if stop is not None and limit[0] is stop.point:
         side.end = stop.end
     return True
+
+
+def _end_where_it_fails(orbit: Orbit, side: Side, settings: Settings) -> None:
+    """End a side before a step over which a condition is violated, and no event says why."""
+    side.drop_tip()
+    if is_at_limit(side.tip.value, settings):
+        side.end = limit_end(side.tip.value, settings)
+    elif not end_of_holds(orbit, side, settings, True):
+        side.end = End(EndReason.SINGULAR)
 
 
 def violates(point: Point) -> bool:

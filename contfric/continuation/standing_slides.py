@@ -13,6 +13,7 @@ time.
 
 from __future__ import annotations
 
+from contfric.continuation.composed_outcomes import Joints, Speeds
 from contfric.continuation.holdable import NO_JUMP, NoJump
 from contfric.continuation.touching import rate_along
 from contfric.errors import NotationError
@@ -35,6 +36,9 @@ _SLIPS = (-1.0, 2.0)
 #: comes back to the limit there, as the acceleration of the slide does.
 _STICKS = (-1.0, 0.0)
 
+#: The edit that lets a segment open, its joints, a reason, and how fast the joints move in time then.
+Opening = tuple[Edit, Joints, str, Speeds]
+
 
 def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     """Tell whether segment ``i`` is a slide between two stops without acceleration at either of them.
@@ -51,7 +55,7 @@ def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     return max(left, abs(rate_along(orbit, mode, exit_, orbit.begins[i]))) < least
 
 
-def left_out(orbit: Orbit, i: int) -> tuple[Edit, dict[tuple[int, int], FloatArray], str]:
+def left_out(orbit: Orbit, i: int) -> tuple[Edit, Joints, str]:
     """Return the edit that leaves a slide out that goes nowhere, the joints that it moves, and a reason.
 
     What follows it, a rest inside the limit, begins at the stop before it.
@@ -74,14 +78,14 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))
 
 
-def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, dict[tuple[int, int], FloatArray], str]:
+def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, Joints, str]:
     """Return the edit that makes one segment of two between which motion only touches a surface, and why."""
     count = len(orbit.itinerary)
     reason = f"segment {j + 1} vanishes: its surface is only touched"
     return *runs_on(orbit, (j - 1) % count, j, (j + 1) % count), reason
 
 
-def runs_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, dict[tuple[int, int], FloatArray]]:
+def runs_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, Joints]:
     """Return the edit, and its joints, that lets segment ``i`` go on to the end of the last one behind it."""
     end = orbit.itinerary[behind[-1]]
     if end in orbit.model.sections:  # its mode says from which side it is crossed
@@ -89,52 +93,54 @@ def runs_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, dict[tuple[int, i
     return Edit(frozenset(behind), {i: end[1]}), {}
 
 
-def slip_at_touch(
-    orbit: Orbit, i: int, surface: str, departs: str, touch: FloatArray
-) -> tuple[Edit, dict[tuple[int, int], FloatArray], str, dict[tuple[int, int], float]]:
-    """Return the edit that lets rest ``i`` slip for no time where its load touches its limit.
-
-    With the joints, a reason, and how fast the joints move in time when the slip opens.
+def slip_at_touch(orbit: Orbit, i: int, surface: str, departs: str, touch: FloatArray) -> Opening:
+    """Return what lets rest ``i`` slip for no time where its load touches its limit.
 
     Raises
     ------
     NotationError
         If the rest begins at the touch, after such a slip.
     """
-    mode, exit_ = orbit.itinerary[i]
-    behind = touch[0] - orbit.begins[i, 0] < _TOUCHES * time_unit(orbit)
-    if behind and orbit.itinerary[i - 1][0] == departs and only_touches(orbit, i - 1):
+    mode = orbit.itinerary[i][0]
+    began = touch[0] - orbit.begins[i, 0] < _TOUCHES * time_unit(orbit)
+    if began and orbit.itinerary[i - 1][0] == departs and only_touches(orbit, i - 1):
         raise NotationError(f"the slip before stick {i + 1} is at this touch of {surface}")
-    left = (departs, left_surface(orbit.model, mode, departs))
-    away = {(i, 0): _SLIPS[0], (i, 1): _SLIPS[1]}
+    slip = departs, left_surface(orbit.model, mode, departs)
     reason = f"slip at the touch of {surface} in stick {i + 1}"
-    return split(i, surface, left, (mode, exit_)), {(i, 0): touch, (i, 1): touch}, reason, away
+    return _opening(orbit, i, (surface, touch), slip, _SLIPS, reason)
 
 
-def stick_at_touch(
-    orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray
-) -> tuple[Edit, dict[tuple[int, int], FloatArray], str, dict[tuple[int, int], float]]:
-    """Return the edit that lets slide ``i`` stick for no time where it touches rest.
-
-    With the joints, a reason, and how fast the joints move in time when the stick opens.
+def stick_at_touch(orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray) -> Opening:
+    """Return what lets slide ``i`` stick for no time where it touches rest.
 
     Raises
     ------
     NotationError
         If such a stick is at this touch already, or would not be left there.
     """
-    model, (mode, exit_) = orbit.model, orbit.itinerary[i]
+    model, mode = orbit.model, orbit.model.whole_mode(orbit.itinerary[i][0])
     short = _TOUCHES * time_unit(orbit)
     began, ended = touch[0] - orbit.begins[i, 0] < short, orbit.ends[i, 0] - touch[0] < short
     if (began and only_touches(orbit, i - 1)) or (ended and only_touches(orbit, i + 1)):
-        raise NotationError(f"the stick beside slide {i + 1} is at this touch of {surface}")
+        raise NotationError(f"the stick next to slide {i + 1} is at this touch of {surface}")
     signs = signs_at(model, float(touch[0]), touch[1:].copy(), orbit.vector, within=NO_JUMP)
     for domain in model.domains_of(rest):
         for back, target in model.exits_of(domain.name):
-            own = model.domain_by_name[target].mode == model.whole_mode(mode)
-            if own and signs[back] == 0:
-                edit = split(i, surface, (rest, back), (mode, exit_))
-                away = {(i, 0): _STICKS[0], (i, 1): _STICKS[1]}
+            if model.domain_by_name[target].mode == mode and signs[back] == 0:
                 reason = f"stick at the touch of rest in slide {i + 1}"
-                return edit, {(i, 0): touch, (i, 1): touch}, reason, away
+                return _opening(orbit, i, (surface, touch), (rest, back), _STICKS, reason)
     raise NoJump(f"'{rest}' is not left to '{mode}' where slide {i + 1} touches {surface}")
+
+
+def _opening(
+    orbit: Orbit,
+    i: int,
+    met: tuple[str, FloatArray],
+    inside: tuple[str, str],
+    lasts: tuple[float, float],
+    reason: str,
+) -> Opening:
+    """Return what puts a segment into segment ``i`` at a touch; it begins and ends there, and opens."""
+    (surface, touch), (first, last) = met, lasts
+    edit = split(i, surface, inside, orbit.itinerary[i])
+    return edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 0): first, (i, 1): last}

@@ -81,8 +81,8 @@ def limit_departures(
             first = [next((d for d in found if _holds(d, signs)), None) for signs in regions]
             if all(d is not None and d.where == through for d in first):
                 continue  # they were asked of this limit
-            beside = [_beside(modes, regions, on[0], side) for side in (1, -1)]
-            left = _limit_side(sampler, known, (on[0], limit), beside)
+            apart = [_mode_at(modes, regions, on[0], side) for side in (1, -1)]
+            left = _limit_side(sampler, known, (on[0], limit), apart)
             if left and any(d is None or d.leaves != {on[0]: left} for d in first):
                 limits.append(Departure({**known, **through}, {on[0]: left}))
     return tuple(limits)
@@ -92,7 +92,7 @@ def _holds(departure: Departure, signs: Mapping[str, int]) -> bool:
     return all(signs[name] == side for name, side in departure.where.items())
 
 
-def _beside(
+def _mode_at(
     modes: Mapping[tuple[tuple[str, int], ...], str],
     regions: Sequence[Mapping[str, int]],
     on: str,
@@ -104,7 +104,7 @@ def _beside(
 
 
 def _limit_side(
-    sampler: Sampler, known: Mapping[str, int], pair: tuple[str, str], beside: Sequence[str]
+    sampler: Sampler, known: Mapping[str, int], pair: tuple[str, str], apart: Sequence[str]
 ) -> int:
     """Return the side that sliding on a surface is left to at one of its limits; 0 if that is not clear.
 
@@ -116,16 +116,16 @@ def _limit_side(
     ----------
     known : the sides of surfaces on which the sliding mode holds
     pair : the surface, and the limit
-    beside : the modes above and below the surface, beyond the limit
+    apart : the modes above and below the surface, beyond the limit
     """
-    if not all(beside):
+    if not all(apart):
         return 0
     verdicts: dict[bool, set[int]] = {True: set(), False: set()}
     others = {name: side for name, side in known.items() if name not in pair}
     for other in (sampler, _moved(sampler)):
         places = (_both_met(other, pair, t, y) for t, y in other.states(_TRIES))
         for place in itertools.islice(filter(None, places), _PLACES):
-            modes = zip((1, -1), beside, strict=True)
+            modes = zip((1, -1), apart, strict=True)
             outward = [(s * other.rate(mode, pair[0], s, *place), s) for s, mode in modes]
             inward = [side for rate, side in outward if rate < -_STILL]
             if len(inward) != 1 or not all(np.isfinite(outward).flat):

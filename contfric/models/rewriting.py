@@ -17,7 +17,7 @@ SHARED: tuple[Place, ...] = (
 OF_MODES: tuple[Place, ...] = (("modes", None, "field", None),)
 OTHERS: tuple[Place, ...] = (
     *(("period",), ("spread", None), ("surfaces", None, "level"), ("quantities", None)),
-    ("forces", None, "texts", None),
+    *(("forces", None, "texts", None), ("forces", None, "rest"), ("forces", None, "at")),
 )
 
 

@@ -47,9 +47,9 @@ from contfric.handle import TABLE, WEIGHTS, Block, Bound, HandleType, with_handl
 from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.equations import LayoutType
-from contfric.orbit.integral_parts import IntegralCourse, integral_workspace, reach_node
-from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment
-from contfric.orbit.peak import ExtremeType, extreme_workspace, fill_cycle
+from contfric.orbit.integral_parts import IntegralCourse, reach_node
+from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn
+from contfric.orbit.peak import ExtremeType
 from contfric.quantities.operations import differentiate_tape, evaluate_tape
 from contfric.quantities.tape import Tape
 
@@ -279,13 +279,8 @@ def carry(  # type: ignore[no-untyped-def]
     """Write what :func:`contfric.orbit.integrals.integrate` does, the integrals carried along as states."""
     m, free, exact, whole = z.shape[1], which.shape[0], on_joints.shape[0] > 0, extreme.whole
     length, count, columns, n = whole.modes.shape[0], out.shape[0], 3 + m + free, m - 1
-    d_period, none, turn = np.zeros(free), np.empty(0, dtype=np.int64), 0.0
-    own = integral_workspace(tape, length, m, p.shape[0], which, none, 0, columns)
-    orbit = extreme_workspace(length, m, min(length, 0))
-    fill_cycle(functions, layout, extreme, z, p, orbit)
-    if layout.turn != 0.0:
-        turn = layout.turn * functions.period(p, none, own.equations.empty)
-        functions.period(p, own.exact.which, d_period)
+    turn = whole_turn(functions, layout, extreme, tape, z, p, which, 0, columns)
+    own, d_period = turn.own, turn.d_period
     out[:] = 0.0
     on_joints[:, :, :] = 0.0
     by_parameters[:, :] = 0.0
@@ -295,11 +290,9 @@ def carry(  # type: ignore[no-untyped-def]
         moving[:free], moving[free] = which, p.shape[0]
     sizes, start, end = numbers[p.shape[0] + 1 :], np.zeros(n + count), np.empty(n + count)
     jac = np.empty((n + count if exact else 0, 2 + n + count + free + 1))
-    for k in range(
-        2 * length
-    ):  # sizes of all segments are known before the first one is integrated
-        i, joint = k % length, orbit.cycle[k % length]
-        lasts = enter_segment(functions, whole, i, z, turn, joint, p, own)
+    for k in range(2 * length):  # the sizes of all are known before one is integrated
+        i, joint = k % length, turn.cycle[k % length]
+        lasts = enter_segment(functions, whole, i, z, turn.last, joint, p, own)
         if not lasts > 0.0:
             continue
         if k < length:

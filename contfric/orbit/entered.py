@@ -126,19 +126,19 @@ def entered_domain(
 def _likely(start: StartState, signs: Mapping[str, int]) -> Iterator[Domain]:
     """Yield the domains next to a state, those first that lie on most of its surfaces.
 
-    Chatter is none of them: impacts of any speed begin on its wall.
+    Chatter is left out: impacts of any speed begin on its wall.
     """
     model = start.model
     first = model.domain_of(signs, start.t, start.y, start.vector)
     if first is not None and model.domain_by_name[first].own_mode not in model.chatter_by_mode:
         yield model.domain_by_name[first]
-    beside = [
+    near = [
         d
         for d in model.domains
         if d.own_mode not in model.chatter_by_mode
         and all(sign in (0, d.signs[name]) for name, sign in signs.items())
     ]
-    yield from sorted(beside, key=lambda d: -sum(side == 0 for side in d.signs.values()))
+    yield from sorted(near, key=lambda d: -sum(side == 0 for side in d.signs.values()))
 
 
 def _composed(model: ComposedModel, start: StartState, signs: Mapping[str, int]) -> str | None:

@@ -2,13 +2,49 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+import numpy as np
 from numba import types
 
-from contfric.compiled import helper, indices, table, vector
+from contfric.compiled import allocating_helper, helper, indices, table, vector
+from contfric.models.definition import FloatArray
 from contfric.orbit.after_reset import apply_reset
+from contfric.orbit.integral_parts import integral_workspace
+from contfric.orbit.peak import extreme_workspace, fill_cycle
 from contfric.quantities.tape import Tape
 
 TapeType = types.NamedTuple([table, vector, indices, indices], Tape)
+
+
+class Turn(NamedTuple):
+    """The whole orbit that is integrated over.
+
+    Attributes
+    ----------
+    own : workspace
+    cycle : joints of all segments, shape (segments, m)
+    last : period of the equations, 0 where time 0 is the end of a cycle; with its derivatives
+    """
+
+    own: Any
+    cycle: FloatArray
+    last: float
+    d_period: FloatArray
+
+
+@allocating_helper
+def whole_turn(functions, layout, extreme, tape, z, p, which, images, columns):  # type: ignore[no-untyped-def]
+    """Return the whole orbit with joints z, and a workspace; of ``images`` segments others are images."""
+    length, m = extreme.whole.modes.shape[0], z.shape[1]
+    d_period, none, last = np.zeros(which.shape[0]), np.empty(0, dtype=np.int64), 0.0
+    own = integral_workspace(tape, length, m, p.shape[0], which, none, images, columns)
+    orbit = extreme_workspace(length, m, min(length, 0))
+    fill_cycle(functions, layout, extreme, z, p, orbit)
+    if layout.turn != 0.0:
+        last = layout.turn * functions.period(p, none, own.equations.empty)
+        functions.period(p, own.exact.which, d_period)
+    return Turn(own, orbit.cycle, last, d_period)
 
 
 @helper

@@ -43,13 +43,12 @@ from contfric.orbit.integral_parts import (
     VALUES_KNOWN,
     IntegralCourse,
     add_part,
-    integral_workspace,
     resolved,
     sample_at_once,
     sample_part,
 )
-from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment
-from contfric.orbit.peak import Extreme, ExtremeType, extreme_workspace, fill_cycle
+from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn
+from contfric.orbit.peak import Extreme, ExtremeType
 from contfric.orbit.system import IntArray
 from contfric.quantities.motion import goes_on
 from contfric.quantities.panels import DEEPEST, RESOLVED, ROUNDING, resolved_level
@@ -203,20 +202,15 @@ def integrate(  # type: ignore[no-untyped-def]
     """
     m, free, exact, whole = z.shape[1], which.shape[0], on_joints.shape[0] > 0, extreme.whole
     length, columns = whole.modes.shape[0], 3 + m + free if exact else 1
-    d_period, none, turn = np.zeros(free), np.empty(0, dtype=np.int64), 0.0
     images = z.shape[0] if exact and length > z.shape[0] else 0
-    own = integral_workspace(tape, length, m, p.shape[0], which, none, images, columns)
-    orbit = extreme_workspace(length, m, min(length, 0))
-    fill_cycle(functions, layout, extreme, z, p, orbit)
-    if layout.turn != 0.0:
-        turn = layout.turn * functions.period(p, none, own.equations.empty)
-        functions.period(p, own.exact.which, d_period)
+    turn = whole_turn(functions, layout, extreme, tape, z, p, which, images, columns)
+    own, d_period = turn.own, turn.d_period
     out[:] = 0.0
     on_joints[:, :, :] = 0.0
     by_parameters[:, :] = 0.0
     for k in range(2 * length):  # sizes of all segments are known before the first one is resolved
-        i, joint = k % length, orbit.cycle[k % length]
-        lasts = enter_segment(functions, whole, i, z, turn, joint, p, own)
+        i, joint = k % length, turn.cycle[k % length]
+        lasts = enter_segment(functions, whole, i, z, turn.last, joint, p, own)
         course = IntegralCourse(
             functions, p, tape, extra, chained == 1, whole.modes[i], joint[0], own.begin, lasts
         )

@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from two_masses import stuck_next_to_a_gap
 
 import contfric as cf
 from contfric.models.definition import FloatArray, Model
@@ -108,22 +109,7 @@ def test_ends_are_those_of_simulations_where_a_gap_closes_on_the_way(seed: int) 
     """Another mass meets a spring for some positions: the interval goes on with other segments."""
     rng = np.random.default_rng(seed)
     gap = float(rng.uniform(0.15, 0.3))
-    model = cf.Mechanism(
-        np.eye(2),
-        [[0.2, -0.1], [-0.1, 0.2]],
-        [[2.0, -1.0], [-1.0, 2.0]],
-        contacts={
-            "c1": {"kind": "friction", "velocity": "v1", "kinetic": 0.6, "static": 0.6},
-            "stop": {
-                "kind": "spring",
-                "gap": f"{gap} - q2",
-                "stiffness": float(rng.uniform(0.5, 4.0)),
-            },
-        },
-        force={"q2": "0.15*cos(w*t)"},
-        parameters={"w": float(rng.uniform(0.4, 0.8))},
-        period="2*pi/w",
-    )
+    model = stuck_next_to_a_gap(rng, gap)
     orbit = cf.find_orbit(model, at={"c1": 0.0})
     (rests,) = orbit.resting
     assert rests.limits == ("c1+", "c1-")
@@ -198,3 +184,14 @@ def test_what_cannot_be_is_refused_in_one_line() -> None:
         cf.find_orbit(model, at={name: "here"})  # type: ignore[dict-item]
     with pytest.raises(cf.ParameterError, match="'weak' has no position of rest along the orbit"):
         cf.find_orbit("iwan", {"F": 1.0}, at={"weak": 0.0})
+
+
+def test_a_place_follows_a_parameter_that_is_tied() -> None:
+    stiffness, names = [[2.0, -1.0], [-1.0, 2.0]], {"w": 0.7, "S": 0.5, "S0": 0.6}
+    brake = {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0", "at": "0.2*S0"}
+    asked = {"contacts": {"brake": brake}, "parameters": names, "period": "2*pi/w"}
+    model = cf.Mechanism(
+        np.eye(2), 0.1 * np.eye(2), stiffness, force={"q2": "0.2*cos(w*t)"}, **asked
+    )
+    (rests,) = cf.find_orbit(model, {"S": 0.4, "S0": {"tie": "1.5*S"}}).resting
+    assert rests.value == pytest.approx(0.2 * 1.5 * 0.4, abs=1e-14)

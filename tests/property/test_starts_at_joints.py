@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from two_masses import stuck_next_to_a_gap
 
 import contfric as cf
 from contfric.errors import ContfricError
@@ -136,23 +137,7 @@ def test_of_random_structures(seed: int) -> None:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_of_a_contact_that_sticks_where_a_gap_closes(seed: int) -> None:
     """The velocity of the stuck contact is rounding in the state that a user hands over."""
-    draw = np.random.default_rng(seed)
-    model = cf.Mechanism(
-        np.eye(2),
-        [[0.2, -0.1], [-0.1, 0.2]],
-        [[2.0, -1.0], [-1.0, 2.0]],
-        contacts={
-            "c1": {"kind": "friction", "velocity": "v1", "kinetic": 0.6, "static": 0.6},
-            "stop": {
-                "kind": "spring",
-                "gap": "0.03 - q2",
-                "stiffness": float(draw.uniform(0.5, 4.0)),
-            },
-        },
-        force={"q2": "0.15*cos(w*t)"},
-        parameters={"w": float(draw.uniform(0.4, 0.8))},
-        period="2*pi/w",
-    )
+    model = stuck_next_to_a_gap(np.random.default_rng(seed), 0.03)
     orbit = cf.find_orbit(model, at={"c1": 0.0})
     for t, *y in orbit.begins.tolist():
         for velocity in (1e-32, -1e-32, 1e-17, -1e-17, 0.0):
