@@ -26,6 +26,8 @@ _SPACING, _ONE = 2.16, 10.0
 #: Of more labels than this equal ones are one within a greater distance (points), and none stands far away:
 #: leader lines that cross tell nothing. Nor does one of many hide more than this (a cost).
 _FEW, _ONE_OF_MANY, _NEAREST, _HIDES = 14, 60.0, 3, 30.0
+#: Side of the cells in which lines and markers are counted, in points: much finer than a letter.
+_CELL = 0.5
 #: Radius of a neighbourhood, in points.
 _NEAR = 18.0
 
@@ -54,7 +56,8 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
         most = _HIDES
         todo = _merged(ax, todo, _ONE_OF_MANY * pixels)
         distances = _DISTANCES[:_NEAREST]
-    lines, markers = line_pixels(ax), marker_pixels(ax)
+    cell = _CELL * pixels
+    lines, markers = (_Counts(ax.bbox, cell, found(ax)) for found in (line_pixels, marker_pixels))
     insets = [child.get_tightbbox() for child in ax.child_axes if isinstance(child, Axes)]
     taken: list[Bbox] = [box for box in insets if box is not None]  # with their numbers
     placed: list[Annotation] = []
@@ -68,7 +71,7 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
             continue  # wherever it stood it would hide another one, or too much
         taken.append(_box(centre, size))
         if distance > _DISTANCES[0]:  # later labels do not stand on its leader line
-            markers = np.vstack([markers, np.linspace(at, centre, 12)])
+            markers.add(np.linspace(at, centre, 12))
         offset = (centre - at) / pixels
         leader = distance > _DISTANCES[0]
         placed.append(_annotation(ax, anchor, (float(offset[0]), float(offset[1])), leader=leader))
@@ -147,8 +150,8 @@ def _best_place(
     at: FloatArray,
     size: FloatArray,
     pixels: float,
-    lines: FloatArray,
-    markers: FloatArray,
+    lines: _Counts,
+    markers: _Counts,
     taken: Sequence[Bbox],
     distances: Sequence[float],
 ) -> tuple[FloatArray, float, float]:
@@ -159,7 +162,7 @@ def _best_place(
     centres = at + towards * (away * pixels)[:, None] + 0.5 * size * np.clip(1.5 * towards, -1, 1)
     low, high = centres - 0.5 * size, centres + 0.5 * size
     cost = 0.8 * away + 1.5 * (1.0 - towards[:, 1])
-    cost += _LINE * _inside(low, high, lines) + _MARKER * _inside(low, high, markers)
+    cost += _LINE * lines.inside(low, high) + _MARKER * markers.inside(low, high)
     for other in taken:
         cost += _LABEL * ((low <= other.max) & (other.min <= high)).all(axis=1)
     cost += _BEYOND * ((low < ax.bbox.min) | (high > ax.bbox.max)).any(axis=1)
@@ -171,12 +174,37 @@ def _box(centre: FloatArray, size: FloatArray) -> Bbox:
     return Bbox([centre - 0.5 * size, centre + 0.5 * size])
 
 
-def _inside(low: FloatArray, high: FloatArray, points: FloatArray) -> NDArray[np.int64]:
-    """Return how many of some points lie inside of each box."""
-    x, y = points.T
-    within = (x > low[:, :1]) & (x < high[:, :1]) & (y > low[:, 1:]) & (y < high[:, 1:])
-    counts: NDArray[np.int64] = within.sum(axis=1)
-    return counts
+class _Counts:
+    """Points of a figure, counted in square cells: four sums tell how many lie inside of a box.
+
+    Points beyond the axes do not count: they are not seen.
+    """
+
+    def __init__(self, axes: Bbox, cell: float, points: FloatArray) -> None:
+        self.cell = cell
+        sides = zip(axes.min, np.ceil(np.asarray(axes.size) / cell), strict=True)
+        self.edges = [low + cell * np.arange(count + 1.0) for low, count in sides]
+        #: Points to the left of and below each corner of a cell.
+        self.below = np.zeros([len(edges) for edges in self.edges])
+        self.add(points)
+
+    def add(self, points: FloatArray) -> None:
+        """Count more points."""
+        counts = np.histogram2d(points[:, 0], points[:, 1], bins=self.edges)[0]
+        self.below[1:, 1:] += counts.cumsum(axis=0).cumsum(axis=1)
+
+    def inside(self, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Return how many points lie inside of each box, up to half a cell; corners of shape (boxes, 2)."""
+        left, bottom = self._cells(low)
+        right, top = self._cells(high)
+        below = self.below
+        return below[right, top] - below[left, top] - below[right, bottom] + below[left, bottom]
+
+    def _cells(self, corners: FloatArray) -> list[NDArray[np.int64]]:
+        return [
+            np.clip(np.rint((corners[:, k] - edges[0]) / self.cell).astype(int), 0, len(edges) - 1)
+            for k, edges in enumerate(self.edges)
+        ]
 
 
 def line_pixels(ax: Axes) -> FloatArray:
@@ -186,9 +214,11 @@ def line_pixels(ax: Axes) -> FloatArray:
         if line.get_linestyle() in ("None", "none", "", " ") or not line.get_visible():
             continue
         points = np.asarray(line.get_transform().transform(line.get_xydata()))
-        points = points[np.isfinite(points).all(axis=1)]
-        if len(points) > 1:
-            found.append(_sampled(points, _SPACING * _point_size(ax)))
+        gaps = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        for piece in np.split(points, gaps):
+            drawn = piece[np.isfinite(piece).all(axis=1)]
+            if len(drawn) > 1:
+                found.append(_sampled(drawn, _SPACING * _point_size(ax)))
     return np.vstack(found)
 
 

@@ -67,8 +67,7 @@ def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> Non
     for run in stability_runs(branch, row):
         known = run.stable is not None
         lines = ax.plot(
-            run.x,
-            run.y,
+            *run.line,
             color=colour if known else greyish(colour),
             linestyle=look.styles[
                 "unknown" if not known else "stable" if run.stable else "unstable"
@@ -84,8 +83,7 @@ def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> Non
 def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
     for run in stability_runs(branch, row):
         lines = ax.plot(
-            run.x,
-            run.y,
+            *run.line,
             color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
             linestyle=look.styles["bridge"],
             linewidth=sized(BRIDGE_WIDTH),

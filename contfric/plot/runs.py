@@ -30,6 +30,16 @@ class StabilityRun:
     x: FloatArray
     y: FloatArray
 
+    @property
+    def line(self) -> tuple[FloatArray, FloatArray]:
+        """All quantities as one line with gaps, x and y of shape (quantities (m + 1),)."""
+        count = self.y.shape[1]
+        if count == 1:
+            return self.x, self.y[:, 0]
+        gap = np.full((1, count), np.nan)
+        x = np.append(self.x, np.nan)
+        return np.tile(x, count), np.concatenate([self.y, gap]).T.ravel()
+
 
 class _Vertex(NamedTuple):  # there is one for each point: cheaper than a dataclass
     arc: float
@@ -192,18 +202,15 @@ def _followed(last: FloatArray, values: FloatArray) -> tuple[list[int], list[int
     if abs(n - m) not in (0, 2) or not n or not m:
         return [-1] * m, every
     more, fewer = (last, values) if n > m else (values, last)
-    tries = []
-    for turn in range(
-        len(more)
-    ):  # the list that is longer, from each of its numbers, without its first two
-        own = [(turn + i) % len(more) for i in range(len(more))][abs(n - m) :]
-        for k in range(len(fewer) if n != m else 1):
-            other = [(k + i) % len(fewer) for i in range(len(fewer))]
-            apart = float(np.sum((more[own] - fewer[other]) ** 2))
-            tries.append((apart, own, other))
-    _, own, other = min(tries, key=lambda found: found[0])
-    pairs = zip(other, own, strict=True) if n > m else zip(own, other, strict=True)
-    came = dict(pairs)
+    longer, shorter = len(more), len(fewer)
+    # The longer list from each of its numbers, without its first two; the shorter one from each, or as it is.
+    own = (np.arange(longer)[:, None] + np.arange(longer)[abs(n - m) :]) % longer
+    turns = np.arange(shorter if n != m else 1)
+    other = (turns[:, None] + np.arange(shorter)) % shorter
+    apart = np.sum((more[own][:, None] - fewer[other]) ** 2, axis=2)
+    turn, k = np.unravel_index(np.argmin(apart), apart.shape)
+    pairs = (other[k], own[turn]) if n > m else (own[turn], other[k])
+    came = dict(zip(*(side.tolist() for side in pairs), strict=True))
     kept = [came.get(i, -1) for i in every]
     return kept, [i for i in every if kept[i] < 0]
 
