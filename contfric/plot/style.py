@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -166,6 +167,11 @@ def _nth(palette: Sequence[str], k: int) -> str:
     return _mixed(palette[k % len(palette)], 0.0, 1.0 - _DARKER ** (k // len(palette)))
 
 
+def _simplest_first(name: str) -> tuple[list[int], str]:
+    """Return what sorts names by their numbers: orbits of few segments have the colours that differ most."""
+    return [int(digits) for digits in re.findall(r"\d+", name)], name
+
+
 def branch_colours(names: Iterable[str]) -> dict[str, str]:
     """Return a colour for each name of a branch, the same in every row of a diagram.
 
@@ -175,7 +181,7 @@ def branch_colours(names: Iterable[str]) -> dict[str, str]:
     {'1a': '#D55E00', '2s': '#005A9C'}
     """
     distinct = list(dict.fromkeys(names))
-    others = iter(sorted(set(distinct) - set(_TYPICAL)))
+    others = sorted(set(distinct) - set(_TYPICAL), key=_simplest_first)
     cycle = {name: _nth(_OTHERS, k) for k, name in enumerate(others)}
     return {name: _TYPICAL.get(name) or cycle[name] for name in distinct}
 
