@@ -18,7 +18,7 @@ An orbit at the event is a cyclic sequence of forms (:mod:`contfric.continuation
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -286,8 +286,8 @@ def edited_whole(
         edit |= outcome.edit
         joints |= outcome.joints
         speeds |= outcome.away
-    itinerary = named_by_ends(apply_edit(orbit.itinerary, edit, orbit.model), orbit.model)
     origins = [origin for origin, _ in edited_pieces(orbit.itinerary, edit)]
+    itinerary = _crossing_as_before(orbit, apply_edit(orbit.itinerary, edit, orbit.model), origins)
     starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
     kept = np.zeros(len(orbit.itinerary)) if away is None else away
     moves = np.array([speeds.get(o, kept[o[0]] if o[1] < 0 else 0.0) for o in origins])
@@ -302,3 +302,21 @@ def edited_whole(
     except ValueError as error:
         raise NotationError(str(error)) from None
     return replace(orbit, system=system, joints=starts, status=Status.CONVERGED), moves
+
+
+def _crossing_as_before(
+    orbit: Orbit, itinerary: Itinerary, origins: Sequence[tuple[int, int]]
+) -> Itinerary:
+    """Return an edited itinerary in which sections are crossed the way they were.
+
+    A segment that takes over the exit of others takes over the part of the mode, too, that ended there.
+    """
+    model = orbit.model
+    pairs = list(named_by_ends(itinerary, model))
+    for k, (mode, exit_) in enumerate(pairs):
+        following, put_in = origins[(k + 1) % len(origins)]
+        ended = orbit.itinerary[following - 1]
+        ends_there = put_in < 0 and ended in model.sections and ended[1] == exit_
+        if ends_there and model.whole_mode(ended[0]) == model.whole_mode(mode):
+            pairs[k] = ended
+    return tuple(pairs)
