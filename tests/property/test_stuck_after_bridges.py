@@ -1,4 +1,4 @@
-"""Bridges that end where a contact slips no more: both halves of a symmetric motion lead to the same orbits."""
+"""Bridges that end where a contact slips no more: each half of a symmetric motion leads to the same orbits."""
 
 from __future__ import annotations
 
