@@ -35,6 +35,9 @@ ROUNDING = 1e-16
 NOISE, FALLS, HALVED = 1e-4, 0.7, 4
 #: Halvings of a segment: a billionth of its duration holds nothing that a quantity could feel.
 DEEPEST = 30
+#: Duration of a panel, relative to 1 + its time, within which nodes are hardly told apart: the rounding of
+#: the time, a thousand times over. What is sampled there is noise, and as good as any value of the function.
+_NO_TIME = 1e3 * float(np.finfo(float).eps)
 #: An argument of a kink this small, relative to its largest value, has no sign: at a joint it is rounding.
 _NO_SIGN = 1e-12
 #: Distance from a jump at which its sides are evaluated, as a share of the segment: far above rounding, far
@@ -287,7 +290,8 @@ def _judged(
         ]
     level = resolved_level(segment.model)
     noise = part.depth >= HALVED and FALLS * part.before < left < NOISE
-    if left <= level or noise:
+    lasts = (high - low) * segment.lasts
+    if left <= level or noise or lasts <= _NO_TIME * (1.0 + abs(segment.start)):
         found.panels.append(Panel(low, high, sampled.values(k)))
         return []
     if part.depth == DEEPEST:

@@ -1,4 +1,4 @@
-"""Bridges that end where a contact slips no more: each half of a symmetric motion leads to the same orbits."""
+"""Where a contact slips no more after a bridge: what follows, and slides whose length is rounding."""
 
 from __future__ import annotations
 
@@ -42,3 +42,15 @@ def test_either_half_of_a_bridge_leads_to_the_orbit_that_never_slips(seed: int) 
     for half in (orbit, orbit.mirror()):
         again = cf.explore(half, "w", (1.4, 2.2))
         assert sorted(b.name for b in again.branches) == names
+
+
+@pytest.mark.parametrize("seed", range(3, 6))
+def test_work_is_known_where_a_slide_vanishes(seed: int) -> None:
+    diagram = cf.explore(cf.find_orbit(_chain(np.random.default_rng(seed))), "w", (1.4, 2.2))
+    lasts = np.inf
+    for branch in diagram.branches:
+        assert np.all(np.isfinite(branch.quantity("work(brake)")))
+        lasts = min([lasts, *(np.min(o.ends[:, 0] - o.cycle[:, 0]) for o in branch)])
+    assert lasts < 1e-9  # there are such slides
+    stuck = next(b for b in diagram.branches if b[1].resting)
+    assert not np.any(stuck.quantity("work(brake)"))
