@@ -378,6 +378,8 @@ class Diagram(Shown):
             If bokeh is not installed.
         ResultFileError
             If the file cannot be written.
+        ParameterError
+            If its name does not end with .html or .htm.
         """
         from contfric.plot.live.page import write_page
 

@@ -121,6 +121,8 @@ def _syntax(source: str, error: SyntaxError) -> str:
     foreign = [w for w in words if w not in ("and", "or", "not", "if", "else")]
     if foreign:
         return f"'{foreign[0]}' is a word of Python: use another name"
+    if re.search(r"\bif\b", source):
+        return "a choice is written where(condition, a, b)"
     place = source[max((error.offset or 1) - 1, 0) :]
     where = f" near '{_short(place)}'" if place else " at its end"
     product = re.search(r"(?<![\w.])\d+(?:\.\d*)?\s*[A-Za-z_(]|\w\s+\w|\)\s*[\w(]", source)
