@@ -1,4 +1,4 @@
-"""What passes a bridge where it turns.
+"""Orbits that are born where a bridge folds: sequences of both arms of its passages.
 
 Where passages turn by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
 a candidate, over as many periods as at a sliding event. Elsewhere a hold of a symmetric bridge may still

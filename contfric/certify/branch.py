@@ -1,4 +1,4 @@
-"""Turn a branch into a theorem: a tube of overlapping boxes along it.
+"""Prove a branch: a tube of overlapping boxes along it.
 
 In each box (:mod:`contfric.certify.tube`) the orbits are one smooth curve, and neighbours hold the same
 one: the end of each box lies inside of the next. So between the first and the last box of a stretch there

@@ -1,4 +1,4 @@
-"""The Lyapunov exponents of one motion."""
+"""The Lyapunov exponents of one solution."""
 
 from __future__ import annotations
 

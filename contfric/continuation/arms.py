@@ -1,4 +1,4 @@
-"""Orbits whose holds are longer or shorter, each by itself: what passes a fold at which passages turn.
+"""Both arms of a fold of passages: orbits of which each hold is longer or shorter, independently.
 
 A pin may fix the whole state at which its hold starts: at a touch inside a stick ``u' = 0`` gives the phase
 and ``u = S0`` the position; a stop is fixed where the stick before the slide to it has such an end. Then the

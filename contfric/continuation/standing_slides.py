@@ -1,4 +1,4 @@
-"""Segments that are nothing where nothing jumps: slides that stand in their equilibrium, and mere touches.
+"""Segments of zero length in Filippov models: slides that stay in their equilibrium, and mere touches.
 
 Where no force but a spring's acts on what slides, a slide from a stop just beyond the limit of rest lasts
 half a natural period however small it is: it ends inside the limit, by as much. As its amplitude shrinks to

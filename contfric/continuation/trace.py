@@ -1,4 +1,4 @@
-"""One branch, both ways, to its ends."""
+"""One branch, traced in both directions from its start to its ends."""
 
 from __future__ import annotations
 

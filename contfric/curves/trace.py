@@ -1,4 +1,4 @@
-"""One curve, both ways, to its ends."""
+"""One curve, traced in both directions from its start to its ends."""
 
 from __future__ import annotations
 

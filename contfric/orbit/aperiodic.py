@@ -1,4 +1,4 @@
-"""When a simulation that has not come to a periodic orbit is given up, and what is said of its motion.
+"""When a simulation that finds no periodic orbit is given up, and whether its solution is chaotic.
 
 A motion that is not periodic is known by nothing but patience: chaos may be a transient, and a slow spiral
 needs thousands of periods. So a limit is set by the work, which grows with the events and about with the
@@ -160,7 +160,7 @@ def goes_on(trajectory: Trajectory) -> str:
     if not moves > _APART * (1.0 + float(np.max(np.abs(state)))):
         return ""
     return (
-        f"the motion goes on in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
+        f"the solution stays in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
         "at a section: give the model a surface that it crosses, with two modes of the same field on its "
         "sides"
     )

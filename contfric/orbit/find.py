@@ -1,4 +1,4 @@
-"""From a simulation to a periodic orbit: read off the signature, detect the period, refine by Newton."""
+"""From a simulation to a periodic orbit: identify the signature, detect the period, refine by Newton."""
 
 from __future__ import annotations
 

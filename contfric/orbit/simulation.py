@@ -43,8 +43,8 @@ class SimulationEnd(str, Enum):
     TIME = "the time asked for was reached"
     HELD = "the solution stays on a surface for ever (a mass at rest): nothing releases it"
     IMPOSSIBLE = (
-        "no mode holds where the motion has come to, or events follow each other at once, so that time does "
-        "not go on"
+        "no mode holds where the solution has come to, or events follow each other at once, so that time "
+        "does not go on"
     )
     INFINITE = "the solution diverged"
     QUIET = (

@@ -1,4 +1,4 @@
-"""Running a study: each step of its plan, and whatever happens, what was found is kept."""
+"""Running a study: each step of its plan; results are kept if it is interrupted."""
 
 from __future__ import annotations
 
