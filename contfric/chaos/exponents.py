@@ -182,6 +182,12 @@ def lyapunov_exponent(
     tolerance : relative error of the largest exponent at which averaging ends
     confirm : periods to follow a motion further, after averaging, to see whether it converges after all
 
+    Returns
+    -------
+    LyapunovExponents
+        ``exponents``, shape (n,), per unit of time, largest first; ``error``, that of the largest one;
+        ``motion``, what the solution turned out to be.
+
     Raises
     ------
     ParameterError

@@ -68,6 +68,12 @@ def continue_bifurcation(
     progress : callable, optional
         Called with one line of text now and then.
 
+    Returns
+    -------
+    Curve
+        With k points: ``values`` of both parameters, shape (k, 2); ``special``, its points of codimension
+        two; and two ``ends``.
+
     Raises
     ------
     ParameterError

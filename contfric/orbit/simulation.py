@@ -189,6 +189,12 @@ def simulate(
     domain : initial domain, where the state alone does not decide
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Trajectory
+        Its events: ``times``, shape (k,), ``states``, shape (k, n), ``itinerary`` with mode and exit of each
+        segment, and ``end``, the reason why it ended.
+
     Raises
     ------
     ParameterError

@@ -85,6 +85,11 @@ def solve_orbit(
         Seed of the starts; the same seed gives the same orbit.
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Orbit
+        Solved to rounding and admissible, stable or not.
+
     Raises
     ------
     ConvergenceError

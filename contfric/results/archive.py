@@ -169,6 +169,11 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     model : Model, optional
         The model of the file; needed for one that is not known by its name.
 
+    Returns
+    -------
+    Orbit, Branch, Diagram or other result
+        The same numbers as were saved, to the last bit.
+
     Raises
     ------
     ResultFileError

@@ -50,6 +50,11 @@ def run_study(
     progress : callable, optional
         Called with one line of text now and then.
 
+    Returns
+    -------
+    StudyResult
+        ``found`` has the results, ``files`` what was written, ``info`` the record (``run.json``).
+
     Raises
     ------
     StudyError
