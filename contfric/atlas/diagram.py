@@ -210,7 +210,7 @@ class Diagram(Shown):
         ----------
         executor : any :class:`concurrent.futures.Executor` of processes; by default one after the other here
         time_limit : seconds after which what is left is listed as not reached
-        progress : hears how far it is
+        progress : called with one line of text now and then
 
         Raises
         ------

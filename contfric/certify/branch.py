@@ -190,7 +190,7 @@ def certify_branch(
     Parameters
     ----------
     until : when to end, by ``time.time``; what is left then is listed as such
-    progress : hears how far it is
+    progress : called with one line of text now and then
 
     Raises
     ------

@@ -247,7 +247,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled simulation; the state is copied. Rows are grown as they are needed.
 
-    ``progress`` hears the number of events where that takes more than a tenth of a second.
+    ``progress`` is told the number of events where that takes more than a tenth of a second.
     """
     from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT, simulate
 
