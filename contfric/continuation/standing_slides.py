@@ -1,6 +1,6 @@
 """Segments of zero length in Filippov models: slides that stay in their equilibrium, and mere touches.
 
-Let a spring be the only force on a sliding mass. A slide that starts from a stop at which the load exceeds its
+Let a spring be the only force on a sliding mass. A slide that starts at a stop where the load exceeds its
 limit by w lasts half a natural period, however small w is, and ends where the load is inside the limit by w.
 As w goes to zero its margins, and those of the stops at both ends, vanish together, so that rounding decides
 which of them is located first. It is one event: at the stop before the slide the load is at its limit (SS).
