@@ -27,9 +27,9 @@ PAGE = """# The bundled studies
 Written by `make studies` (`benchmarks/studies.py`, which took {took}): {origin}.
 Each study is run from the shell (`contfric run NAME`), with a limit of {limit:.0f} s; one
 that does not end by itself, or ends with an error, fails the command. The times are those of a whole process
-with its kernels compiled, figures and tables written: of the clock, and of the processors. {once}
+with its kernels compiled, figures and tables written. {once}
 
-| study | what it computes | found | s | processor s |
+| study | what it computes | found | clock, s | processor, s |
 |---|---|---|---|---|
 {rows}
 """
@@ -90,9 +90,8 @@ def found(record: dict[str, Any]) -> str:
     parts = []
     if branches := record.get("branches"):
         points = sum(branch["points"] for branch in branches)
-        parts.append(
-            f"{len(branches)} branches, {points} points, {len(record['bifurcations'])} events"
-        )
+        events = counted(len(record["bifurcations"]), "event")
+        parts.append(f"{counted(len(branches), 'branch')}, {points} points, {events}")
     if plane := record.get("plane"):
         points = sum(curve["points"] for curve in plane["curves"])
         parts.append(
@@ -100,8 +99,14 @@ def found(record: dict[str, Any]) -> str:
         )
     if lmap := record.get("lyapunov"):
         size = " x ".join(str(values[-1]) for values in lmap["grid"].values())
-        parts.append(f"a map of {size} motions")
+        parts.append(f"a Lyapunov map of {size} points")
     return "; ".join(parts) or f"the orbit {record['start']['signature']}"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number with its noun, in the plural unless it is one."""
+    plural = f"{what}es" if what.endswith("ch") else f"{what}s"
+    return f"{number} {what if number == 1 else plural}"
 
 
 def row(name: str, run: Run) -> str:

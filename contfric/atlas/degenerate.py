@@ -1,7 +1,7 @@
 """Events of a diagram that are degenerate as far as rounding can tell: there a diagram has no one answer.
 
-Each test is one on the located events alone. A scene with such an event may give another diagram from another
-start; what differs is told together with it.
+Each test uses the located events alone. A study with such an event may give another diagram from another
+start; differences are reported together with the event.
 """
 
 from __future__ import annotations

@@ -210,7 +210,7 @@ class Diagram(Shown):
         ----------
         executor : any :class:`concurrent.futures.Executor` of processes; by default one after the other here
         time_limit : seconds after which what is left is listed as not reached
-        progress : hears how far it is
+        progress : called with one line of text now and then
 
         Raises
         ------
@@ -378,6 +378,8 @@ class Diagram(Shown):
             If bokeh is not installed.
         ResultFileError
             If the file cannot be written.
+        ParameterError
+            If its name does not end with .html or .htm.
         """
         from contfric.plot.live.page import write_page
 

@@ -71,8 +71,7 @@ def explore(
         arrives with more raises it. Between the ends of a bridge there may be many such orbits
         (period adding).
     max_branches : int
-        Most branches to compute; reached, it is said in the diagram's notes.
-
+        Largest number of branches; if it is reached, the diagram's notes say so.
     seeds : Seeds, optional
         Simulations whose attractors start new branches where they lie on none that is known.
 

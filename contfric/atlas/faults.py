@@ -1,4 +1,4 @@
-"""What a branch must not be: the orbits of another itinerary, or shorter ones, that solve its equations."""
+"""Faults of a branch: orbits of another itinerary, or of a shorter period, that solve its equations."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What passes a bridge where it turns.
+"""Orbits that are born where a bridge folds: sequences of both arms of its passages.
 
-Where passages turn by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
-a candidate, over as many periods as at a sliding event. Elsewhere a hold of a symmetric bridge may still
-have an effect that is stationary in its length. There each of two symmetric holds may be shorter or longer,
-so that the bridge with one of either passes the same solution, and turns there as well.
+If passages fold by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
+a candidate, over as many periods as at a sliding event. Otherwise the effect of a hold of a symmetric bridge
+may be stationary in its length. Then each of the two symmetric holds may become shorter or longer, so that
+a bridge with one shorter and one longer hold passes the same solution, and folds there as well.
 """
 
 from __future__ import annotations

@@ -142,13 +142,13 @@ def _start_of(candidate: Candidate) -> tuple[object, ...]:
 
 
 def _follow_flow(state: Exploration, event: Event) -> None:
-    """Try the itineraries that motions near an event walk."""
+    """Try the itineraries that solutions near an event follow."""
     orbit, settings = event.bifurcation.orbit, state.settings
     if orbit.system.holds:
         return
     active = orbit.model.index_of(settings.parameter)
     shifts = tuple((active, share * settings.width) for share in SHARES)
-    reason = "the itinerary that the flow walks near the event"
+    reason = "the itinerary that the flow follows near the event"
     refused: dict[Itinerary, str] = {}
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
@@ -186,8 +186,8 @@ def _meeting(
 ) -> tuple[Branch | None, list[End]]:
     """Return the branch next to an orbit that ends at an event, and those ends; others were ``asked``.
 
-    A branch may be as short as an event and a doubling next to it are near: what is found at some distance is
-    another one then, and from nearer it is found. Motions near several events may walk the same itinerary,
+    A branch between an event and a doubling next to it may be very short. At a larger distance another branch
+    is found; so smaller distances are tried. Solutions near several events may follow the same itinerary,
     which ends at one of them: what was traced is not traced again.
     """
     for near in _next_to(state, orbit):

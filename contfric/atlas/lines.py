@@ -1,4 +1,4 @@
-"""Directions in which curves of orbits leave one through which two of them pass.
+"""Directions of two curves of orbits at the orbit at which they cross.
 
 The equations with the parameter have a plane of null vectors there. With w their left null vector, the one
 equation that is left over begins with ``w F_zz(d, d)``, a quadratic form on the plane (Lyapunov and Schmidt).

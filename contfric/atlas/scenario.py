@@ -1,4 +1,4 @@
-"""What a non-smooth event is for nearby orbits: persistence, a non-smooth fold, or a jump.
+"""The scenario of a non-smooth event for nearby orbits: persistence, a non-smooth fold, or a jump.
 
 At an event of the vector field's discontinuities (CS, SS, AS, GS) the branches that meet exist on one side
 of the parameter value each. One below and one above: an orbit persists, with another signature. Two on one

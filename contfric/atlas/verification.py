@@ -1,4 +1,4 @@
-"""What a diagram is held against: restarts from its own branches, and sums of indices.
+"""Checks of a diagram: restarts from its own branches, and sums of indices.
 
 * **Restart.** Explored again from any of its branches, with another step, a diagram has the same events and
 branches.

@@ -1,1 +1,1 @@
-"""What every package may use: files, YAML, texts, interrupts, memory, extras, digests of the sources."""
+"""What every package may use: files, YAML, tables, lazy names, interrupts, memory, optional packages."""

@@ -74,10 +74,10 @@ def read_yaml(path: Path) -> LocatedYaml:
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         hint = _COLON if str(error.problem).startswith("mapping values") else ""
-        raise NotationError(f"{path}:{line}: no valid YAML: {error.problem}{hint}") from None
+        raise NotationError(f"{path}:{line}: not valid YAML: {error.problem}{hint}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # ValueError: scalars that look like a date but are not one
-        raise NotationError(f"{path}:1: no valid YAML: {error}") from None
+        raise NotationError(f"{path}:1: not valid YAML: {error}") from None
     if node is None or not isinstance(data, dict):
         raise NotationError(f"{path}:1: must be a mapping of keys to values")
     located = LocatedYaml(path, data, {(): node.start_mark.line + 1})

@@ -34,13 +34,13 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """Which walks may have an orbit: those within the limits that no necessary condition rules out."""
+    """Which itineraries may have an orbit: those within the limits that no condition excludes."""
 
     model: Model
     fates: dict[tuple[ReducedItinerary, int], Fate | None]
 
     def __call__(self, itinerary: ReducedItinerary, periods: int) -> bool:
-        """Return whether a walk may have an orbit."""
+        """Return whether an itinerary may have an orbit."""
         walk = canonical_pair(self.model, itinerary), periods
         return walk in self.fates and self.fates[walk] is None
 
@@ -52,7 +52,7 @@ class Findings:
     Attributes
     ----------
     catalogue : the orbits known after it
-    walks : an example of each walk from the section back to it or to its mirror image
+    walks : an example of each itinerary from the section back to it or to its mirror image
     starts, held, cut, jumps, open, solves, complete : as of the grid and of the search
     farthest : largest position of a fixed point, 0 without any
     """

@@ -1,16 +1,16 @@
 """Cells of a grid, and where the return map of a section may have a fixed point.
 
 A cell is a box of the section whose corners are nodes. With the event j of all corners at the end of
-the same walk back to the section, the gap of a corner is what its return misses,
+the same itinerary back to the section, the gap of a corner is what its return misses,
 
     g = (time since the start - periods, position at the return - position at the start),
 
 for a return to the mirror image after half of an odd number of periods the same with the image.
 A fixed point is a zero of g. The box of the gaps at the corners, enlarged by its own size, contains the
 gaps in the cell unless g bends in the cell by as much as it changes; where that enlarged box does
-not contain zero the cell has no fixed point of this walk. Otherwise the cell is **near**.
+not contain zero the cell has no fixed point of this itinerary. Otherwise the cell is **near**.
 
-Corners whose walks differ within the limits make a cell **mixed**: a discontinuity goes through it.
+Corners whose itineraries differ within the limits make a cell **mixed**: a discontinuity goes through it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from contfric.censuses.grid import Grid
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import IntArray
 
-#: Times at which walks may differ without a matter, beyond the longest orbit (periods).
+#: Times at which itineraries may differ without harm, beyond the longest orbit (periods).
 _SLACK = 0.05
 
 
@@ -50,12 +50,12 @@ class Cells:
 
 @dataclass(frozen=True)
 class Near:
-    """Cells that may have a fixed point of one walk.
+    """Cells that may have a fixed point of one itinerary.
 
     Attributes
     ----------
     cells : their indices, shape (K,)
-    event : index of the event that closes the walk
+    event : index of the event that closes the itinerary
     periods, half : of the orbit; whether it closes with its mirror image
     gaps : at the corners, shape (K, 2**d, d)
     """
@@ -107,7 +107,7 @@ def common_walks(grid: Grid, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[n
 
 
 def near_cells(grid: Grid, cells: Cells, common: NDArray[np.bool_]) -> Iterator[Near]:
-    """Yield the cells that are near to a fixed point, for every walk and number of periods."""
+    """Yield the cells that are near to a fixed point, for every itinerary and number of periods."""
     code = grid.code[cells.rows[:, 0]]
     for event in range(grid.events):
         for half in (False, True):
@@ -131,7 +131,7 @@ def _near(grid: Grid, cells: Cells, chosen: IntArray, event: int, half: bool) ->
 
 
 def closing_nodes(grid: Grid, rows: IntArray, limit: FloatArray) -> Iterator[Near]:
-    """Yield the nodes with gaps below a limit, shape (d,), for every walk and number of periods.
+    """Yield the nodes with gaps below a limit, shape (d,), for every itinerary and number of periods.
 
     The cells of the result are the rows of the nodes.
     """

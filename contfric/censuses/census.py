@@ -29,7 +29,7 @@ from contfric.models.tied import tied
 from contfric.orbit.itineraries import whole_of
 from contfric.signature import ReducedItinerary
 
-#: Cells of a curve: 4096 a period at first (0.02 s for walks of ten events), and where walks differ
+#: Cells of a curve: 4096 a period at first (0.02 s for ten events); where itineraries differ
 #: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.
 _CURVE = Mesh(coarse=12, torn=36, near=36, settled=36)
 #: Cells of other sections, an axis: 64 at first, as the return maps of slides bend over about a tenth of
@@ -108,7 +108,7 @@ def census(
     if model.resets or rests != 1 or sum(s.switching for s in model.surfaces) != 1:
         raise ParameterError(
             f"model '{model.name}': a census is offered for models with one switching surface, rest on "
-            "it, and no impacts: the walks of others cannot be bounded by their stops"
+            "it, and no impacts: the itineraries of others cannot be bounded by their stops"
         )
     state = _Census(model, vector, limits, finer, most_starts, seed, progress)
     try:
@@ -141,7 +141,7 @@ class _Census:
     def prepare(self) -> None:
         """List the itineraries, and what necessary conditions leave of them."""
         if self.progress is not None:
-            self.progress("listing the walks")
+            self.progress("listing the itineraries")
         self.itineraries = closed_itineraries(self.model, self.limits.stops)
         arcs = exit_arcs(self.model, self.vector)
         self.fates = fates_before(self.model, self.itineraries, self.limits.periods, arcs)

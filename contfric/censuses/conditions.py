@@ -1,4 +1,4 @@
-"""Conditions that every orbit of a walk obeys, decided before anything is simulated, and what became of it.
+"""Conditions that every orbit of an itinerary obeys, decided without a simulation; what became of it.
 
 * **Displacement.** On one side of the stop surface the displacement grows, on the other it falls, at
   rest it stays. Over a period it returns; so an itinerary whose segments all lie on one side (or on none)
@@ -30,13 +30,13 @@ _INSIDE = 1e-9
 
 
 class Fate(str, Enum):
-    """What became of a walk; the text says what it means."""
+    """What became of an itinerary; the text says what it means."""
 
-    ONE_WAY = "pruned: the displacement never returns"
-    TURNS = "pruned: its exits cannot be met in so few periods"
-    NOT_WALKED = "not walked by any start (heuristic: the grid may be too coarse)"
-    NOT_CLOSED = "walked, but no orbit of this many periods"
-    FOUND = "walked by an orbit"
+    ONE_WAY = "excluded: the displacement never returns"
+    TURNS = "excluded: its exits cannot be met in so few periods"
+    NOT_WALKED = "followed by no start (heuristic: the grid may be too coarse)"
+    NOT_CLOSED = "followed, but no orbit of this many periods"
+    FOUND = "followed by an orbit"
 
 
 @dataclass(frozen=True)

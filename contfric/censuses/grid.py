@@ -1,4 +1,4 @@
-"""A grid of starts on a section, refined where it is asked for, and the walks that they take.
+"""A grid of starts on a section, refined where it is asked for, and the itineraries that they take.
 
 Nodes are points of a lattice of integers (2**bits of them an axis, shifted by the seed), so that cells
 of any size share them; each node is simulated once. What a node keeps of its trajectory are its events
@@ -32,7 +32,7 @@ from contfric.signature import ReducedItinerary
 _AT_ONCE = 4096
 #: Periods followed beyond the longest orbit: nodes on both sides of a return have to see it.
 _BEYOND = 0.5
-#: Multiplier of the hash of a walk: odd, and random in all its bits (that of Knuth's generator MMIX).
+#: Multiplier of the hash of an itinerary: odd, and random in all its bits (that of Knuth's generator MMIX).
 _HASH = np.uint64(6364136223846793005)
 
 
@@ -61,7 +61,7 @@ class Grid:
         each event of each node, shapes (K, E), (K, E), (K, E, n)
     time, start : phase in periods and state of each node, shapes (K,), (K, n)
     held, cut : starts that come to rest for ever, and that make more stops than the limit allows
-    walked : an example of each walk from the section back to it or to its mirror image, by its hash
+    walked : an example of each itinerary from the section back to it or to its mirror image, by its hash
     """
 
     section: Section
@@ -242,7 +242,7 @@ class Grid:
         return np.where(going & few, code, -1)
 
     def _note_walks(self, code: IntArray) -> None:
-        """Keep one example of each walk from the section back to it, or to its mirror image."""
+        """Keep one example of each itinerary from the section back to it, or to its mirror image."""
         if not len(code):
             return
         hashes = np.empty(code.shape, dtype=np.uint64)

@@ -1,11 +1,11 @@
-"""Which walks a census asks for: the closed itineraries of the transition graph up to a number of stops.
+"""Closed itineraries of the transition graph up to a number of stops: those that a census asks for.
 
 A **stop** is the end of a slide on a switching surface. The closed itineraries with up to N stops are
 generated as necklaces (least rotations), by the recursion of H. Fredricksen, I. J. Kessler and J. Maiorana
 (Discrete Math. 23 (1978) 207-210) in the form of F. Ruskey: an itinerary ``a_1 .. a_t`` whose longest
 Lyndon prefix has length p can be continued by the letters ``>= a_{t+1-p}``, and is a necklace if p
 divides t. Of an itinerary and its mirror image one is kept. Itineraries that repeat a shorter one are kept:
-an orbit born at a period doubling walks the itinerary of its parent twice, and is not its repetition.
+an orbit born at a period doubling follows the itinerary of its parent twice, and is not its repetition.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def closed_itineraries(model: Model, stops: int) -> list[ReducedItinerary]:
     Raises
     ------
     ParameterError
-        If the model has closed walks without a stop: the number of stops does not bound its itineraries.
+        If the model has closed itineraries without a stop: the number of stops does not bound them.
 
     Examples
     --------
@@ -110,7 +110,7 @@ def _least(itinerary: Sequence[int], images: tuple[int, ...] | None) -> tuple[in
 
 
 class _Graph:
-    """The transition graph as words walk it: sets of domains as bits.
+    """The transition graph as itineraries pass it: sets of domains as bits.
 
     A letter is entered in some domains of its mode, and leads from them, across transparent surfaces
     inside of the mode and then through its exit, into domains of the next letter's mode.
@@ -181,7 +181,7 @@ def _necklaces(graph: _Graph, weights: Sequence[int], most: int) -> Iterator[tup
 
 
 def _check_bounded(model: Model, graph: _Graph, weights: Sequence[int]) -> None:
-    """Refuse a model whose graph can be walked round without a stop."""
+    """Refuse a model whose graph has a cycle without a stop."""
     letters = graph.letters
     left = {k for k in range(len(letters)) if weights[k] == 0}
     while left:
@@ -193,7 +193,7 @@ def _check_bounded(model: Model, graph: _Graph, weights: Sequence[int]) -> None:
         if not ending:
             names = ", ".join(show([letters[k]]) for k in sorted(left))
             raise ParameterError(
-                f"model '{model.name}' has closed walks without a stop ({names}): their number is "
+                f"model '{model.name}' has closed itineraries without a stop ({names}): their number is "
                 "not bounded by stops, so that a census cannot list them"
             )
         left -= ending

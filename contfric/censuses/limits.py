@@ -67,4 +67,4 @@ def _resolution(search: SectionSearch) -> str:
         text += f" of each axis, positions within {search.reach:.3g}"
     else:
         text += " of a period"
-    return f"{text}; a walk that lives inside of one first cell alone may be missed"
+    return f"{text}; an itinerary within a single first cell may be missed"

@@ -20,11 +20,11 @@ _SAME = 1e-8
 
 @dataclass(eq=False)
 class Catalogue:
-    """Orbits by their walks.
+    """Orbits by their itineraries.
 
     Attributes
     ----------
-    continua : walks on which the orbits found are degenerate; one orbit of each is kept
+    continua : itineraries on which the orbits found are degenerate; one orbit of each is kept
     """
 
     orbits: dict[tuple[ReducedItinerary, int], list[Orbit]] = field(default_factory=dict)

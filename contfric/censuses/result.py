@@ -66,7 +66,7 @@ class Census(Shown):
         Most excitation periods and most stops of an orbit that was asked for.
     orbits : tuple of Orbit
         Stable or not, one of each mirror pair, by periods, stops and name.
-    walks : tuple of Walk
+    walks : tuple of ClosedItinerary
         Every closed itinerary over every number of periods, with its fate.
     searches : tuple of SectionSearch
         What was done on each section.
@@ -114,7 +114,7 @@ class Census(Shown):
 
     @cached_property
     def itineraries(self) -> dict[Fate, int]:
-        """Number of walks by their fate."""
+        """Number of itineraries by their fate."""
         return {fate: sum(walk.fate is fate for walk in self.walks) for fate in Fate}
 
     words = renamed("words", "itineraries")
@@ -187,7 +187,7 @@ class Census(Shown):
             [
                 f"census of {self.model.name} at {where}",
                 self.table(),
-                f"walks ({len(self.walks)}):",
+                f"itineraries ({len(self.walks)}):",
                 *counts,
                 "limits:",
                 *(f"  {text}" for text in self.limits),

@@ -55,7 +55,7 @@ _BENT = 0.5
 #: Largest gap near a fixed point, in sizes of a cell from it: what a return stretches distances by,
 #: where discontinuities do not let the cell itself show it.
 _STRETCH = 16.0
-#: Fixed points of one walk nearer than this (relative) are one: rounding over a slope of 1e-5.
+#: Fixed points of one itinerary nearer than this (relative) are one: rounding over a slope of 1e-5.
 _SAME = 1e-10
 #: Gap that is rounding, where a line is asked for.
 _ROUNDING = 1e-9
@@ -63,7 +63,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Root:
-    """A fixed point of a walk's map: coordinates on the section and, in one dimension, its slope."""
+    """A fixed point of an itinerary's map: coordinates on the section and, in one dimension, its slope."""
 
     at: FloatArray
     slope: float | None
@@ -75,7 +75,7 @@ class Search:
 
     Attributes
     ----------
-    wanted : which walks (itinerary, periods) may have an orbit
+    wanted : which itineraries (itinerary, periods) may have an orbit
     most : number of starts at which it ends
     jumps, open : discontinuities, and near returns without an orbit, that are left at the smallest size
     """

@@ -1,4 +1,4 @@
-"""Turn a branch into a theorem: a tube of overlapping boxes along it.
+"""Prove a branch: a tube of overlapping boxes along it.
 
 In each box (:mod:`contfric.certify.tube`) the orbits are one smooth curve, and neighbours hold the same
 one: the end of each box lies inside of the next. So between the first and the last box of a stretch there
@@ -190,7 +190,7 @@ def certify_branch(
     Parameters
     ----------
     until : when to end, by ``time.time``; what is left then is listed as such
-    progress : hears how far it is
+    progress : called with one line of text now and then
 
     Raises
     ------

@@ -40,6 +40,11 @@ def certify_census(model: ModelSource, params: Parameters | None = None) -> Cens
     ----------
     params : of the model; defaults fill in
 
+    Returns
+    -------
+    CensusCertificate
+        The orbits that exist, and ``proved``: whether it is proved that no other one does.
+
     Raises
     ------
     ParameterError

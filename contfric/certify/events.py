@@ -1,4 +1,4 @@
-"""Turn a located event into a theorem: its parameter to 30 digits, that it is a simple one, and of its kind.
+"""Prove a located event: its parameter to 30 digits, its kind, and that it is nondegenerate.
 
 The extended system of :mod:`contfric.certify.extended` has exactly one zero in a thin box around Newton's
 limit, and its Jacobian is regular there. The orbit at the event obeys every inequality, but for the one

@@ -1,4 +1,4 @@
-"""Turn a computed orbit into a theorem.
+"""Prove a computed orbit.
 
 1. Interval Newton (:mod:`contfric.certify.krawczyk`) on the chain of segments, in a box around the printed
    joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.

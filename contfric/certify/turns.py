@@ -1,4 +1,4 @@
-"""The two turns of an orbit on a branch that ends at a period doubling, or at a symmetric orbit (BP)."""
+"""The two halves of an orbit on a branch that ends at a period doubling, or at a symmetric orbit (BP)."""
 
 from __future__ import annotations
 

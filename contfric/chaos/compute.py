@@ -71,6 +71,12 @@ def lyapunov_map(
     tile : points along the side of a tile
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    LyapunovMap
+        ``values``, the largest exponent per unit of time at each point of the grid, shape (len, len);
+        rows are the first parameter.
+
     Raises
     ------
     ParameterError

@@ -1,4 +1,4 @@
-"""The Lyapunov exponents of one motion."""
+"""The Lyapunov exponents of one solution."""
 
 from __future__ import annotations
 
@@ -181,6 +181,12 @@ def lyapunov_exponent(
     transient : periods before averaging begins
     tolerance : relative error of the largest exponent at which averaging ends
     confirm : periods to follow a motion further, after averaging, to see whether it converges after all
+
+    Returns
+    -------
+    LyapunovExponents
+        ``exponents``, shape (n,), per unit of time, largest first; ``error``, that of the largest one;
+        ``motion``, what the solution turned out to be.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One motion behind a joint: whether it is periodic, what its tangents carry on, how it ends; compiled."""
+"""One solution after a joint: whether it is periodic, its tangent vectors, how it ends; compiled."""
 
 from __future__ import annotations
 

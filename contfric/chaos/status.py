@@ -29,7 +29,7 @@ class Motion(Coded):
     OUTSIDE = "the model is not defined at these parameters; there are no exponents"
     MISSING = "not computed: the map was interrupted"
     BROKEN = "the integration of the solution or of its tangent broke off; there are no exponents"
-    CHATTER = "impacts follow each other faster and faster, and motion does not go on; no exponents"
+    CHATTER = "impacts follow each other faster and faster, and the solution ends; no exponents"
     UNCUT = (
         "the solution meets no surface any more and does not converge: the model needs a section"
     )

@@ -1,4 +1,4 @@
-"""Workspaces of motions side by side, and that of one of them, compiled."""
+"""Workspaces of several solutions side by side, and that of one of them, compiled."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def certify(options: argparse.Namespace) -> int:
 
     folder: Path = options.folder
     if not folder.is_dir():
-        raise ResultFileError(f"{folder} is no folder of a run")
+        raise ResultFileError(f"{folder} is not the folder of a run")
     pool = ProcessPoolExecutor(options.jobs) if options.jobs > 1 else nullcontext()
     with pool as executor, ProgressLine(options.quiet) as show:
         found = certify_folder(

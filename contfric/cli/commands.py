@@ -89,7 +89,7 @@ def info(options: argparse.Namespace) -> int:
         lines = [*headline(record), *findings(record), *proposals(record), *work(record)]
     except OSError as error:
         raise ResultFileError(
-            f"{options.folder} is no folder of a run: cannot read {path} ({error.strerror})"
+            f"{options.folder} is not the folder of a run: cannot read {path} ({error.strerror})"
         ) from None
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ResultFileError(

@@ -17,6 +17,8 @@ _COMMANDS = (
     *("doctor", "verify", "certify"),
 )
 _DEBUG = "show the traceback of an error"
+_PARAMETER = "a parameter, such as Omega=0.5 or S0=S; may be repeated"
+_STUDY = "YAML file, or name of a bundled study"
 
 
 class UsageError(ContfricError):
@@ -74,7 +76,7 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 def _parser() -> _Parser:
     parser = _Parser(
         prog="contfric",
-        description="Periodic orbits and bifurcations of dry-friction oscillators.",
+        description="Periodic orbits and bifurcations of oscillators with dry friction, impacts or switches.",
         epilog="STUDY is the path of a YAML file or the name of a bundled study, such as fig05.",
         allow_abbrev=False,
     )
@@ -128,7 +130,7 @@ def _described(
 
 
 def _fill_run(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("study", metavar="STUDY")
+    parser.add_argument("study", metavar="STUDY", help=_STUDY)
     parser.add_argument("--out", metavar="DIR", help="folder of the results (default: ./NAME)")
     parser.add_argument("--json", action="store_true", help="print run.json to stdout")
     parser.add_argument("--force", action="store_true", help="replace results of an earlier run")
@@ -136,7 +138,7 @@ def _fill_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _fill_explain(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("study", metavar="STUDY")
+    parser.add_argument("study", metavar="STUDY", help=_STUDY)
 
 
 def _fill_info(parser: argparse.ArgumentParser) -> None:
@@ -154,7 +156,7 @@ def _fill_view(parser: argparse.ArgumentParser) -> None:
 def _fill_certify(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("folder", metavar="DIR", type=Path, help="folder of a run")
-    add("--jobs", type=_count, default=1, metavar="N", help="processes (%(default)s)")
+    add("--jobs", type=_count, default=1, metavar="N", help="number of processes (%(default)s)")
     add("--time-limit", type=_number, metavar="SECONDS", help="end after this many seconds")
     add("--quiet", action="store_true", help="no progress")
 
@@ -166,7 +168,7 @@ def _fill_verify(parser: argparse.ArgumentParser) -> None:
 def _fill_doctor(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--compile", action="store_true", help="compile all kernels that are not in the cache")
-    add("--workers", type=_count, metavar="N", help="processes (default: one a core)")
+    add("--workers", type=_count, metavar="N", help="number of processes (default: one a core)")
 
 
 def _fill_signatures(parser: argparse.ArgumentParser) -> None:
@@ -213,17 +215,21 @@ def _fill_graph(parser: argparse.ArgumentParser) -> None:
 def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
-    add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help="a parameter")
-    add("--state", metavar="X,V", help="initial state, numbers joined by commas")
+    add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help=_PARAMETER)
+    add(
+        "--state",
+        metavar="X,V",
+        help="initial state: numbers joined by commas, in the order of the states",
+    )
     add("--time", type=_number, default=0.0, help="initial time (%(default)s)")
     add("--domain", help="initial domain, where the state alone does not decide")
     add(
         "--periods",
         type=_number,
         default=100.0,
-        help="periods of excitation or clock (%(default)s)",
+        help="length, in periods of excitation or clock (%(default)s)",
     )
-    add("--events", type=_count, default=1_000_000, help="most events to follow (%(default)s)")
+    add("--events", type=_count, default=1_000_000, help="largest number of events (%(default)s)")
     add("--find", action="store_true", help="say on stderr what the solution converges to")
 
 
@@ -237,12 +243,17 @@ def _fill_census(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         action="append",
         default=[],
-        help="a parameter",
+        help=_PARAMETER,
     )
-    add("--periods", type=_count, default=2, help="most excitation periods (%(default)s)")
-    add("--stops", type=_count, default=6, help="most stops (%(default)s)")
-    add("--finer", type=int, default=0, help="halvings of all cells, 0 to 3 (%(default)s)")
-    add("--seed", type=int, default=0, help="shifts the nets (%(default)s)")
+    add("--periods", type=_count, default=2, help="largest number of periods (%(default)s)")
+    add("--stops", type=_count, default=6, help="largest number of stops, v = 0 (%(default)s)")
+    add(
+        "--finer",
+        type=int,
+        default=0,
+        help="halve all cells of the grids so often, 0 to 3 (%(default)s)",
+    )
+    add("--seed", type=int, default=0, help="shifts the grids of starts (%(default)s)")
     add("--json", action="store_true", help="print everything as JSON")
     add("--quiet", action="store_true", help="no progress")
 

@@ -1,1 +1,1 @@
-"""Behind compiled code: its files on disk, what it was compiled for, how it is announced and inlined."""
+"""Compiled functions (kernels): their files on disk, the processor they are for, messages, inlining."""

@@ -1,4 +1,4 @@
-"""What is compiled is said while it is, with the time that it will take, and how long it took.
+"""Messages while kernels are compiled: which, how long it will take, and how long it took.
 
 The times of this machine are kept in the cache. A kernel that was never compiled here takes what it took on
 the machine of :mod:`contfric.compiling.compile_seconds`, times what other kernels took here against there.

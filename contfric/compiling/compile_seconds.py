@@ -1,4 +1,4 @@
-"""How long kernels take to compile, where that is known of no earlier time.
+"""Estimates of how long kernels take to compile, if they were never compiled on this machine.
 
 Seconds on one core of an AMD EPYC of 2.6 GHz, all kernels of the package one after the other
 (``contfric doctor --compile --workers 1``): which kernel comes first pays for the helpers that others share.

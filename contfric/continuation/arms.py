@@ -1,19 +1,18 @@
-"""Orbits whose holds are longer or shorter, each by itself: what passes a fold at which passages turn.
+"""Both arms of a fold of passages: orbits of which each hold is longer or shorter, independently.
 
 A pin may fix the whole state at which its hold starts: at a touch inside a stick ``u' = 0`` gives the phase
 and ``u = S0`` the position; a stop is fixed where the stick before the slide to it has such an end. Then the
 motion from one pin to the next, a **passage**, is an equation of its own for the length of its hold, and the
 orbits are the cyclic sequences of passages. Near a fold ``lambda = c s^2`` a passage has two lengths, its
-arms ``s = +-(lambda / c)^(1/2)``. An orbit that runs through turning passages n times is 2^n orbits beyond
-the fold, and each of their curves goes on through it, with all signs exchanged.
+arms ``s = +-(lambda / c)^(1/2)``. An orbit with n such passages is one of 2^n orbits beyond the fold,
+and each of their curves passes the fold, where all signs change.
 
-With the Jacobian J of an orbit at fixed parameters, a passage turns by itself if J has a null vector in which
-its own joints move alone, those between its two pins. That is what is tested; nothing is assumed of pins.
+Let J be the Jacobian of an orbit at fixed parameters. A passage folds by itself if J has a null vector that
+moves only the joints between its two pins. This is tested; nothing is assumed about the pins.
 
-A whole unit turns by itself where the way to its pin does, and the hold before makes good for it: a stick
-has one number x left, its position, and ``G(x, lambda) = 0`` says that the pin is met. Where ``dG/dx = 0``,
-x has two values, and the hold of the unit before is as long as it takes to come to either. No joints move
-alone then, but over two units J has two null vectors: one for each of the two x.
+A unit may also fold as a whole. The position x of the stick before its pin is free, and ``G(x, lambda) = 0``
+says that the pin is met. At the fold ``dG/dx = 0``: beyond it x has two values, and the hold of the unit
+before leads to either. All joints move then, but over two units J has two null vectors, one for each x.
 """
 
 from __future__ import annotations

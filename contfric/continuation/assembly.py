@@ -1,4 +1,4 @@
-"""Branches from the sides of their starts: one array a column, bifurcations in order."""
+"""Branches from their two half-branches: one array a column, bifurcations in order."""
 
 from __future__ import annotations
 

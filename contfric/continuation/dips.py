@@ -1,4 +1,4 @@
-"""Whether a value that has one sign at both ends of a step may have the other one in between, compiled.
+"""Whether a value with the same sign at both ends of a step may change it twice in between, compiled.
 
 By the interpolation that what is known of it allows; :mod:`contfric.continuation.pairs` says where each is
 used.

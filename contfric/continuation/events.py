@@ -263,12 +263,10 @@ class Bifurcation(MeasuredEvent):
             return f"another mode is chosen at the reset '{reset}'"
         entered = filter(None, (entered_at(self.orbit.system, test) for test in self.tests))
         if mode := next(entered, ""):
-            return f"grazing: motion that crosses stays in '{mode}', and the map jumps"
+            return f"grazing: a solution that crosses stays in '{mode}', and the map jumps"
         thrown = filter(None, (thrown_at(self.orbit, test) for test in self.tests))
         if surface := next(thrown, ""):
-            return (
-                f"grazing: the reset at '{surface}' takes motion somewhere else, and the map jumps"
-            )
+            return f"grazing: the reset at '{surface}' leads to another place, and the map jumps"
         return meaning_of(self.kind, model, {test.surface for test in self.tests})
 
     def certify(self, parameter: str = "") -> EventCertificate:

@@ -1,4 +1,4 @@
-"""How near to a sliding event the signs of slopes and multipliers are told.
+"""How near to a sliding event the signs of slopes and multipliers are reliable.
 
 At a sliding event at which a segment comes in, two curves cross. A segment that leaves a surface and comes
 back to it (a contact that is touched, a slide that grazes rest) may have no length: its equation is

@@ -1,4 +1,4 @@
-"""Branch points and period doublings of bridges.
+"""Branch points and period doublings of bridges, which have no multipliers: from signs of determinants.
 
 An orbit with holds has no multipliers. But its equations can be singular for a disturbance that changes
 sign after a turn as those of any orbit, and a branch leaves there: of a symmetric orbit the asymmetric

@@ -344,7 +344,7 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Successor:
     mode, exit_ = itinerary[i]
     if thrown_at(orbit, location):
         raise NotationError(
-            f"after the reset at {location.surface} motion starts somewhere else: no orbit is near"
+            f"after the reset at {location.surface} the solution starts somewhere else: no orbit is near"
         )
     if location.margin is Margin.INTERIOR:
         edit = split(i, location.surface, (mode, exit_))

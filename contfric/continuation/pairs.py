@@ -1,4 +1,4 @@
-"""What happens within one step of a branch or curve and is undone in it, compiled.
+"""Pairs of events within one step of a branch or curve, which change no sign at its ends; compiled.
 
 A value f that has one sign at both ends of a step may have the other one in between: two events, and none
 of them is seen at the points. Four signs of it are looked for before a point is accepted.

@@ -1,4 +1,4 @@
-"""What has happened over the last step of a branch: located, told from what is known, and what it ends."""
+"""Events of the last step of a branch: located, compared with known ones, and whether they end the branch."""
 
 from __future__ import annotations
 

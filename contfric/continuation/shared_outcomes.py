@@ -1,4 +1,4 @@
-"""What follows an event of friction contacts that share their loads, where nothing jumps.
+"""What follows an event of friction contacts that share their loads, if the return map is continuous.
 
 Two contacts change at once: ``first``, at whose surface segment i ends, and another one. Where that is
 

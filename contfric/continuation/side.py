@@ -1,4 +1,4 @@
-"""One side of a branch while it grows: rows that the compiled march fills, and what is kept of them.
+"""A half-branch while it is traced: rows that the compiled march fills, and what is kept of them.
 
 The march needs tangents and tests of the last points only. What a branch keeps of a point (joints,
 parameter, arclength, labels, multipliers) is copied out of the rows when they are full.

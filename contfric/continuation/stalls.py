@@ -1,4 +1,4 @@
-"""Where a branch gets no farther: what is singular there, in words."""
+"""Where no further step of a branch is possible: what is singular there, in words."""
 
 from __future__ import annotations
 

@@ -1,14 +1,13 @@
-"""Segments that are nothing where nothing jumps: slides that stand in their equilibrium, and mere touches.
+"""Segments of zero length in Filippov models: slides that stay in their equilibrium, and mere touches.
 
-Where no force but a spring's acts on what slides, a slide from a stop just beyond the limit of rest lasts
-half a natural period however small it is: it ends inside the limit, by as much. As its amplitude shrinks to
-nothing its margins and those of the stops at both of its ends vanish together, each as a multiple of one
-number. So which of them is located first is rounding. It is one event: at the stop before the slide the load
-is at its limit (SS). Without the slide the solution is the same.
+Let a spring be the only force on a sliding mass. A slide that starts at a stop where the load exceeds its
+limit by w lasts half a natural period, however small w is, and ends where the load is inside the limit by w.
+As w goes to zero its margins, and those of the stops at both ends, vanish together, so that rounding decides
+which of them is located first. It is one event: at the stop before the slide the load is at its limit (SS).
+Without the slide the solution is the same.
 
-Motion that just touches a surface on which it could slide does so for no time, and goes on as before: it has
-two forms, with that stick of no length and without. And rest whose load just touches its limit slips for no
-time.
+A solution that just touches a surface on which it could slide has two forms, with a stick of zero length and
+without. Likewise a rest whose load just touches its limit may have a slip of zero length.
 """
 
 from __future__ import annotations

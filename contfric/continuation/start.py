@@ -1,4 +1,4 @@
-"""The first point of a branch: at no event, and with one direction to go on in."""
+"""The first point of a branch: not at an event, and with a unique tangent."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def too_fast(orbit: Orbit) -> str:
         if lost > _UNKNOWN * (1.0 + abs(view.level(surface))):
             return (
                 f"'{mode}' comes to '{surface}' at a rate of {rate:.1g}: rounding of the time is {lost:.1g} "
-                "of its observable. Move the surface to where motion is slower: a neuron that "
+                "of its observable. Move the surface to where the solution is slower: a neuron that "
                 "blows up is at any height at nearly the same time"
             )
     return ""

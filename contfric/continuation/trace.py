@@ -1,4 +1,4 @@
-"""One branch, both ways, to its ends."""
+"""One branch, traced in both directions from its start to its ends."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def continue_orbit(
     stop_at: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Branch:
-    """Continue an orbit in one parameter, both ways, to the ends of its branch.
+    """Continue an orbit in one parameter, in both directions, to the ends of its branch.
 
     Folds, branch points, period doublings and tangencies are passed; a sliding event ends it.
 
@@ -60,10 +60,16 @@ def continue_orbit(
         Whether multipliers are evaluated; without them PD is not detected, nor BP where no
         asymmetric branch turns.
     max_points : int
-        Most points of each side; a branch that reaches it says so.
+        Largest number of points of each half-branch; a branch that reaches it says so.
     stop_at : mapping, optional
         Quantities by name or expression, and a value of each, such as ``{"x_max": 1.4}``: a branch ends
         where the first of them is taken, exactly there, with the reason STOP.
+
+    Returns
+    -------
+    Branch
+        With k points: ``values`` of the parameter, shape (k,), ``multipliers``, shape (k, n), each
+        ``branch[i]`` an orbit; ``bifurcations`` in order, and two ``ends`` with their reasons.
 
     Raises
     ------
@@ -76,8 +82,8 @@ def continue_orbit(
     -----
     Ctrl-C ends the branch where it is, with the reason INTERRUPTED.
 
-    What detection cannot see: two events of the same kind within one step whose test functions do
-    not betray it by a parabola through three points. A smaller ``max_step`` shows them.
+    What detection cannot see: two events of the same kind within one step, if a parabola through three
+    values of the test function has no zero there. A smaller ``max_step`` shows them.
 
     Examples
     --------

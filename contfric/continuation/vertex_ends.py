@@ -1,4 +1,4 @@
-"""Ends of a side at a vertex: where the parameter turns, and another curve of orbits crosses."""
+"""Ends of a half-branch at a vertex: where the parameter turns, and another curve of orbits crosses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curves from the sides of their starts."""
+"""Curves from their two halves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where fold curves of asymmetric (doubled) orbits are born: the orbits become symmetric (undoubled)."""
+"""Where fold curves of asymmetric (doubled) orbits begin: the orbits become symmetric (undoubled)."""
 
 from __future__ import annotations
 

@@ -186,6 +186,11 @@ def continue_extremum(
     progress : callable, optional
         Called with one line of text now and then.
 
+    Returns
+    -------
+    ExtremumCurve
+        With k points: the parameters and the value of the quantity at each, and two ``ends``.
+
     Raises
     ------
     ParameterError

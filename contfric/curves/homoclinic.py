@@ -70,6 +70,11 @@ def continue_homoclinic(
     max_step, max_points, progress
         As for :func:`contfric.continue_bifurcation`.
 
+    Returns
+    -------
+    HomoclinicCurve
+        The curve of orbits of one long period, which approximates the homoclinic end.
+
     Raises
     ------
     ParameterError

@@ -74,6 +74,11 @@ def continue_quantity(
     progress : callable, optional
         Called with one line of text now and then.
 
+    Returns
+    -------
+    QuantityCurve
+        With k points: ``values`` of both parameters, shape (k, 2), ``stable`` (k,), and two ``ends``.
+
     Raises
     ------
     ParameterError

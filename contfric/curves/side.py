@@ -1,4 +1,4 @@
-"""One side of a curve while it grows: its points, and what is done with what it meets."""
+"""One half of a curve while it is traced: its points, and how it goes on after what it meets."""
 
 from __future__ import annotations
 

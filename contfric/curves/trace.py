@@ -1,4 +1,4 @@
-"""One curve, both ways, to its ends."""
+"""One curve, traced in both directions from its start to its ends."""
 
 from __future__ import annotations
 
@@ -67,6 +67,12 @@ def continue_bifurcation(
         Most points of each side; a curve that reaches it says so.
     progress : callable, optional
         Called with one line of text now and then.
+
+    Returns
+    -------
+    Curve
+        With k points: ``values`` of both parameters, shape (k, 2); ``special``, its points of codimension
+        two; and two ``ends``.
 
     Raises
     ------

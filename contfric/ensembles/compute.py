@@ -94,6 +94,11 @@ def ensemble(
     tile : samples in a tile
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Ensemble
+        Events, bands of a quantity and classes of the diagrams, one diagram a sample.
+
     Raises
     ------
     ParameterError

@@ -139,6 +139,11 @@ def explore_equilibria(
     progress : callable, optional
         Called with a line of text for each branch.
 
+    Returns
+    -------
+    EquilibriumDiagram
+        All branches that were found, with their events.
+
     Examples
     --------
     >>> import contfric as cf

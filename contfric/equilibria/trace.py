@@ -50,6 +50,11 @@ def continue_equilibrium(
     max_points : int
         Most points each way.
 
+    Returns
+    -------
+    EquilibriumBranch
+        Its points, through every mode that it visits, and its events.
+
     Raises
     ------
     ParameterError

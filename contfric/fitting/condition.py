@@ -1,4 +1,4 @@
-"""One condition of a fit: the orbit, or the event, of some data, and what it says to them.
+"""One condition of a fit: the orbit, or the event, of some data, and its predictions.
 
 A condition is solved from where it was in the last trial, and by a simulation where that fails, so that
 signatures may change on the way. It depends on nothing else: any process can solve it, to the same bits.

@@ -83,6 +83,12 @@ def fit(
     progress : callable, optional
         Called with one line of text for each trial.
 
+    Returns
+    -------
+    Fit
+        ``params`` with the fitted values, ``sigma`` with their standard deviations, their ``covariance``, and
+        whether the search has ``converged``.
+
     Raises
     ------
     ParameterError

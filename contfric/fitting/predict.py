@@ -1,4 +1,4 @@
-r"""What a model says to each measurement, with derivatives by every parameter.
+r"""Predictions of a model for each measurement, with derivatives by every parameter.
 
 At a fixed time t a signal g moves by its change at a fixed share of the segment, less its rate times the
 solution of that share's time: :math:`\delta g|_t = \delta g|_s - \dot g\,\delta t|_s`.

@@ -1,4 +1,4 @@
-"""What a fit has found: parameters with their covariance, and what the model says to each measurement."""
+"""What a fit has found: parameters with their covariance, and the predictions for each measurement."""
 
 from __future__ import annotations
 

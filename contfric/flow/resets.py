@@ -1,4 +1,4 @@
-"""The reset of a model that has none: the state as it is."""
+"""The reset of a model without resets: the identity."""
 
 from __future__ import annotations
 

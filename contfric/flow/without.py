@@ -1,4 +1,4 @@
-"""What stands in for a function that a flow does not have, or that nobody will ask for."""
+"""Placeholders of functions that a flow does not have, or that are not needed."""
 
 from __future__ import annotations
 

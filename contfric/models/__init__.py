@@ -52,6 +52,10 @@ def load_model(model: ModelSource) -> Model:
         A bundled name, the name of an entry point, the path of a YAML file (a text that ends in
         ``.yaml`` or ``.yml``, or has a folder in it), or a class that declares a model.
 
+    Returns
+    -------
+    Model
+
     Raises
     ------
     ParameterError

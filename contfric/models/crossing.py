@@ -98,7 +98,7 @@ class CrossingSurfaces:
             if rest != 0:
                 self.refuse(
                     f"the fields around that place do not add up in '{state}' (f++ - f+- - f-+ + f-- is "
-                    "not 0), so that motion there is not determined by them"
+                    "not 0), so that sliding there is not determined by them"
                 )
 
     def _check_matrix(self) -> None:
@@ -107,7 +107,7 @@ class CrossingSurfaces:
             self.refuse("the 2 x 2 system for both switches is singular")
         if any(a.free_symbols & {self.formulas.t, *self.formulas.y} for a in self.matrix):
             self.refuse(
-                "how strongly each switch drives depends on the state or on time, and regions of motion "
+                "how strongly each switch drives depends on the state or on time, and regions of sliding "
                 "there are not derived"
             )
         values = {
@@ -117,7 +117,7 @@ class CrossingSurfaces:
         a = [[float(self.matrix[i, j].subs(values)) for j in (0, 1)] for i in (0, 1)]
         if a[0][0] >= 0 or a[1][1] >= 0 or a[0][0] * a[1][1] - a[0][1] * a[1][0] <= 0:
             self.refuse(
-                f"at the defaults motion is not driven back to both (the matrix of rates is {a}; its "
+                f"at the defaults solutions are not driven back to both (the matrix of rates is {a}; its "
                 "diagonal "
                 "has to be negative, its determinant positive)"
             )
@@ -132,7 +132,7 @@ class CrossingSurfaces:
         one, other = self.surfaces
         raise EntryError(
             ("surfaces", one, "sliding"),
-            f"'{one}' and '{other}' cross each other, and motion could slide on both: {why}. Write the "
+            f"'{one}' and '{other}' cross each other, and solutions could slide on both: {why}. Write the "
             "sliding modes yourself",
         )
 

@@ -114,7 +114,7 @@ def model_from(description: Description) -> Model:
             continue
         raise EntryError(
             ("modes", modes[-1], "in"),
-            f"motion that meets '{surface}' in '{domain.name}' could go on in {' or '.join(modes)}: give "
+            f"a solution that meets '{surface}' in '{domain.name}' could go on in {' or '.join(modes)}: give "
             f"them a side of a surface that divides them, or write a reset at '{surface}' with "
             f"'to: {modes[0]}'",
         )

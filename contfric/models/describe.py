@@ -232,7 +232,11 @@ def _modes(
             entry.fail("rank", f"'rank' is a whole number from 0 to {len(states)}, got {rank!r}")
         found.append(ModeText(name, rates, sides, rank))
     if not found:
-        top.fail("modes", "a model has at least one mode")
+        example = ", ".join(f"{name}: -" for name in known)
+        top.fail(
+            "modes",
+            f"a model has at least one mode, such as modes: {{free: {{in: {{{example}}}}}}}",
+        )
     return tuple(found)
 
 

@@ -107,8 +107,8 @@ def _crossing(
     if more or len(surfaces) > 2:
         raise EntryError(
             ("surfaces", one, SLIDING),
-            f"'{one}' and '{other}' cross each other, and {len(surfaces)} surfaces slide: motion on two that "
-            "cross is derived where no others slide. Write the sliding modes yourself",
+            f"'{one}' and '{other}' cross each other, and {len(surfaces)} surfaces slide: sliding on two "
+            "that cross is derived where no others slide. Write the sliding modes yourself",
         )
     return one, other
 

@@ -117,10 +117,11 @@ def _source(text: str | float) -> str:
 
 
 def _syntax(source: str, error: SyntaxError) -> str:
-    words = [w for w in source.replace("(", " ").replace("*", " ").split() if keyword.iskeyword(w)]
-    foreign = [w for w in words if w not in ("and", "or", "not", "if", "else")]
-    if foreign:
+    words = {w for w in re.findall(r"\w+", source) if keyword.iskeyword(w)}
+    if foreign := sorted(words - {"and", "or", "not", "if", "else"}):
         return f"'{foreign[0]}' is a word of Python: use another name"
+    if "if" in words:
+        return "a choice is written where(condition, a, b)"
     place = source[max((error.offset or 1) - 1, 0) :]
     where = f" near '{_short(place)}'" if place else " at its end"
     product = re.search(r"(?<![\w.])\d+(?:\.\d*)?\s*[A-Za-z_(]|\w\s+\w|\)\s*[\w(]", source)

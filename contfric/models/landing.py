@@ -186,7 +186,7 @@ def reset_of(
             ("resets", surface),
             f"the reset at '{surface}' acts in no mode: it does in those that lie on one side of it. Write "
             f"that side to the 'in' of a mode ({surface}: + or {surface}: -), or 'from: [modes]' to "
-            "the reset if motion passes the surface in them",
+            "the reset if solutions cross the surface in them",
         )
     landing = Landing(sampler, surface, surfaces, domains, leads)
     if landing.arrivals:

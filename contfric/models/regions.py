@@ -132,7 +132,7 @@ def _shared(mode: ModeText, other: str, sides: Sides) -> str:
     return (
         f"modes '{other}' and '{mode.name}' share the region ({where}), and one of them holds nowhere else: "
         "give each a side of a surface that divides them. (Modes may overlap if each holds alone somewhere, "
-        f"too: motion stays in its mode. Else a reset has to lead to one of them: 'to: {mode.name}')"
+        f"too: a solution stays in its mode. Else a reset has to lead to one of them: 'to: {mode.name}')"
     )
 
 

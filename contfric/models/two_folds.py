@@ -58,9 +58,9 @@ _LEAST = 3
 class TwoFoldKind(str, Enum):
     """Kinds of two-folds; the text says what motion does there."""
 
-    VISIBLE = "visible: motion on both sides leaves the surface"
-    MIXED = "visible-invisible: motion on one side leaves the surface, on the other it comes back"
-    INVISIBLE = "invisible (Teixeira's singularity): motion on both sides comes back"
+    VISIBLE = "visible: solutions on both sides leave the surface"
+    MIXED = "visible-invisible: solutions leave the surface on one side, and come back on the other"
+    INVISIBLE = "invisible (Teixeira's singularity): solutions on both sides come back"
     DEGENERATE = "degenerate: a tangency of higher order"
 
 

@@ -1,9 +1,9 @@
-"""When a simulation that has not come to a periodic orbit is given up, and what is said of its motion.
+"""When a simulation that finds no periodic orbit is given up, and whether its solution is chaotic.
 
-A motion that is not periodic is known by nothing but patience: chaos may be a transient, and a slow spiral
-needs thousands of periods. So a limit is set by the work, which grows with the events and about with the
-square of the number of states. Whether it is chaotic then is asked of two motions that begin close to each
-other: their distance grows as ``exp(t/t_0)`` along a chaotic motion, in proportion to t at most along a
+No finite simulation shows that a solution is not periodic: chaos may be a transient, and a slow spiral
+needs thousands of periods. So the work is limited; it grows with the number of events, and about with the
+square of the number of states. Two solutions that begin close to each other then tell whether it is chaotic:
+their distance grows as ``exp(t/t_0)`` along a chaotic solution, and at most in proportion to t along a
 quasi-periodic one.
 """
 
@@ -160,7 +160,7 @@ def goes_on(trajectory: Trajectory) -> str:
     if not moves > _APART * (1.0 + float(np.max(np.abs(state)))):
         return ""
     return (
-        f"the motion goes on in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
+        f"the solution stays in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
         "at a section: give the model a surface that it crosses, with two modes of the same field on its "
         "sides"
     )

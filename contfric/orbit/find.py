@@ -1,4 +1,4 @@
-"""From a simulation to a periodic orbit: read off the signature, detect the period, refine by Newton."""
+"""From a simulation to a periodic orbit: identify the signature, detect the period, refine by Newton."""
 
 from __future__ import annotations
 
@@ -68,19 +68,27 @@ def find_orbit(
     longest: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
-    """Simulate until the solution repeats itself, read off its signature and solve for it.
+    """Simulate until the solution repeats itself, identify its signature and solve for it.
 
     Parameters
     ----------
+    model, params : the model (its name, file or class) and its parameters; defaults fill in
     periods : int, optional
         Period wanted, in periods of the excitation; by default any from 1 to 64.
     state, time : initial condition; by default displaced from rest
     at : where contacts rest that never slip along the orbit, such as ``{"brake": 0.12}``; by default where
         the model's file says (``at``), else where the simulation leaves them
     longest : int, optional
-        Periods to simulate before the motion is called aperiodic; by default 50,000, or fewer (not below
+        Periods to simulate before the solution is called aperiodic; by default 50,000, or fewer (not below
         1,000) where it has many states and meets many events.
     progress : called with one line of text now and then, where it takes long
+
+    Returns
+    -------
+    Orbit
+        Solved to rounding, in the units of the model. ``joints``, shape (N, 1 + n), has the start time and
+        state of each segment of its itinerary (of one half, if it is symmetric); ``multipliers`` has
+        shape (n,).
 
     Raises
     ------

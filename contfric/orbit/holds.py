@@ -1,4 +1,4 @@
-"""Holds in the boundary-value problem: what pins the start of a hold, and how it is left.
+"""Holds in the boundary-value problem: the condition at the start of a hold, and how it is left.
 
 A hold has no exit condition; in its place stands its pin, a condition at its start:
 

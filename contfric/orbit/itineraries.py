@@ -1,4 +1,4 @@
-"""Words of an orbit and of its half, and the domains that its segments pass."""
+"""Itineraries of an orbit and of its half, and the domains that its segments pass."""
 
 from __future__ import annotations
 

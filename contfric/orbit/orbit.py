@@ -393,7 +393,7 @@ class Orbit(MeasuredOrbit):
         from contfric.orbit.kept_positions import positions_of
 
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
-        name = self.name if self.converged else "not solved"  # an iterate may walk no signature
+        name = self.name if self.converged else "not solved"  # an iterate may have no signature
         # where else they may rest takes solves (resting)
         kept = "".join(f"; {p.said(self)}" for p in positions_of(self)) if self.converged else ""
         return f"<Orbit {name}: {values}; {self.status.name.lower()}{kept}>"

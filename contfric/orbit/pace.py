@@ -1,4 +1,4 @@
-"""How much a compiled kernel may do in one call, so that Python gets its turn: Ctrl-C acts between calls.
+"""The work of one call of a compiled kernel is limited, so that Ctrl-C acts between calls.
 
 A kernel that may run for long takes a budget, and hands back what it needs to go on exactly where it was.
 Nothing that is computed depends on where it was cut.

@@ -1,4 +1,4 @@
-"""The signature of an orbit, read off its solved segments: domains, holds and impacts in order."""
+"""The signature of an orbit, from its solved segments: domains, holds and impacts in order."""
 
 from __future__ import annotations
 

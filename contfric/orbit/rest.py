@@ -37,8 +37,8 @@ def check_rest(trajectory: Trajectory) -> None:
 
 def _stays_at(trajectory: Trajectory) -> str:
     return (
-        f"no periodic orbit: the motion comes to rest at {_place(trajectory.model, trajectory.last[2])}, and "
-        "nothing moves it from there. Choose other parameters or another start"
+        f"no periodic orbit: the solution comes to rest at {_place(trajectory.model, trajectory.last[2])}, "
+        "and nothing moves it from there. Choose other parameters or another start"
     )
 
 
@@ -67,8 +67,8 @@ def comes_to_rest(trajectory: Trajectory) -> str:
     """Return what is said of a solution that turns about the place where its surfaces meet."""
     where = _place(trajectory.model, trajectory.states[-1])
     return (
-        f"no periodic orbit: the motion comes to rest near {where}, where surfaces meet: it crosses them in "
-        "smaller and smaller turns. Choose other parameters or another start"
+        f"no periodic orbit: the solution comes to rest near {where}, where surfaces meet: it crosses them "
+        "in smaller and smaller turns. Choose other parameters or another start"
     )
 
 

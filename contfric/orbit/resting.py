@@ -1,4 +1,4 @@
-"""Whether impacts that follow come to rest: a look ahead, made as rarely as what is known of them allows.
+"""Whether the next impacts come to rest (chatter): decided ahead, and only where that is possible.
 
 A mode of chatter begins with the first of infinitely many impacts, so after an impact the later ones are
 looked at, over many periods. Impacts that do not come to rest are thrown off, go on for ever, or meet another

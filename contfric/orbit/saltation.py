@@ -1,4 +1,4 @@
-"""Joints at which a disturbance is carried on whatever the rate of the exit, which may vanish there.
+"""Saltation matrices that are finite although the rate of the exit vanishes.
 
 After a joint at which the field jumps, a disturbance is multiplied by the saltation matrix, with the rate
 of the exit as divisor [1]_. Where a surface is only touched that rate is 0, and a segment after it has no

@@ -43,8 +43,8 @@ class SimulationEnd(str, Enum):
     TIME = "the time asked for was reached"
     HELD = "the solution stays on a surface for ever (a mass at rest): nothing releases it"
     IMPOSSIBLE = (
-        "no mode holds where the motion has come to, or events follow each other at once, so that time does "
-        "not go on"
+        "no mode holds where the solution has come to, or events follow each other at once, so that time "
+        "does not go on"
     )
     INFINITE = "the solution diverged"
     QUIET = (
@@ -189,6 +189,12 @@ def simulate(
     domain : initial domain, where the state alone does not decide
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Trajectory
+        Its events: ``times``, shape (k,), ``states``, shape (k, n), ``itinerary`` with mode and exit of each
+        segment, and ``end``, the reason why it ended.
+
     Raises
     ------
     ParameterError
@@ -241,7 +247,7 @@ def run(
 ) -> Trajectory:
     """Run the compiled simulation; the state is copied. Rows are grown as they are needed.
 
-    ``progress`` hears the number of events where that takes more than a tenth of a second.
+    ``progress`` is told the number of events where that takes more than a tenth of a second.
     """
     from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT, simulate
 

@@ -1,4 +1,4 @@
-"""What inequalities may miss zero by: at an event they vanish, and their sign is rounding."""
+"""Tolerances of inequalities: at an event they vanish, and their sign is rounding."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def solve_orbit(
 ) -> Orbit:
     """Find an admissible orbit of a signature at given parameters, stable or not.
 
-    Short simulations from many starts are searched for stretches that walk the signature's itinerary;
+    Short simulations from many starts are searched for stretches that follow the itinerary of the signature;
     those that nearly close are handed to Newton.
 
     Parameters
@@ -84,6 +84,11 @@ def solve_orbit(
     seed : int
         Seed of the starts; the same seed gives the same orbit.
     progress : called with one line of text now and then
+
+    Returns
+    -------
+    Orbit
+        Solved to rounding and admissible, stable or not.
 
     Raises
     ------
@@ -131,7 +136,7 @@ def _explain(signature: Signature, params: Mapping[str, float], nearest: Orbit |
     where = ", ".join(f"{k} = {v:.6g}" for k, v in params.items())
     text = f"no admissible orbit '{name}' was found at {where}"
     if nearest is None:
-        text += ": no start walks this signature"
+        text += ": no start follows this signature"
     elif not nearest.converged:
         text += (
             f"; the best start ended with residual {nearest.residual:.2g} ({nearest.status.value})"
@@ -171,7 +176,7 @@ def _solved_starts(
 def _matching_stretches(
     system: System, vector: FloatArray, seed: int, say: Callable[[str], None]
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Yield (mismatch, joints) of simulated stretches that walk the itinerary of one turn."""
+    """Yield (mismatch, joints) of simulated stretches that follow the itinerary of one turn."""
     model = system.model
     rng = np.random.default_rng(seed)
     low, high = model.region(vector)
@@ -199,7 +204,7 @@ def _matching_stretches(
 def stretches(
     trajectory: Trajectory, system: System, period: float
 ) -> Iterator[tuple[float, FloatArray]]:
-    """Yield (mismatch, joints) for each place where a trajectory walks the system's itinerary."""
+    """Yield (mismatch, joints) for each place where a trajectory follows the system's itinerary."""
     model, count = system.model, system.segments
     itinerary = named_by_ends(trajectory.itinerary, model)
     clock = trajectory.times + trajectory.cycles * period

@@ -1,4 +1,4 @@
-"""A fit: measured values with their standard deviations, and what the model says."""
+"""A fit: measured values with their standard deviations, and predictions."""
 
 from __future__ import annotations
 

@@ -26,7 +26,8 @@ _UNBOUNDED, _MISSING = lighter(GREY, 0.35), lighter(GREY, 0.75)
 def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
     r"""Draw a Lyapunov map: where the largest exponent is positive beyond its error it is shaded.
 
-    White is regular (or not decided); grey is where there is no exponent.
+    White is where no exponent is positive beyond its error (periodic, quasi-periodic, or undecided); grey is
+    where there is no exponent. The legend, below the axes, says so.
 
     Parameters
     ----------
@@ -51,7 +52,9 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
     root = ax.figure
     if root is not None:
         bar = root.colorbar(mesh, ax=ax)
-        bar.set_label(r"largest Lyapunov exponent $\lambda$", fontsize=sized(TEXT))
+        bar.set_label(
+            r"largest Lyapunov exponent $\lambda$ (per unit of time)", fontsize=sized(TEXT)
+        )
         bar.ax.tick_params(labelsize=sized(SMALL + 1))
     name_axes(ax, *map(parameter_label, lmap.axes))
     ax.set_title(fixed_text(lmap.params), fontsize=sized(TEXT))
@@ -60,7 +63,9 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
 
 def _draw_ground(ax: Axes, lmap: LyapunovMap) -> None:
     """Mark in grey where there are no exponents, and say why."""
-    handles = []
+    handles = [
+        Patch(facecolor="white", edgecolor=GREY, linewidth=0.5, label="no positive exponent")
+    ]
     for missing, colour in ((False, _UNBOUNDED), (True, _MISSING)):
         cells = lmap.absent(missing)
         if not cells.any():
@@ -68,5 +73,11 @@ def _draw_ground(ax: Axes, lmap: LyapunovMap) -> None:
         ground = np.ma.masked_where(~cells, np.ones(cells.shape))
         draw_cells(ax, lmap.axes, ground, cmap=ListedColormap([colour]), zorder=1.0)
         handles.append(Patch(color=colour, label="not computed" if missing else "no exponent"))
-    if handles:
-        ax.legend(handles=handles, fontsize=sized(SMALL), loc="best")
+    ax.legend(
+        handles=handles,
+        fontsize=sized(SMALL),
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.12),
+        ncol=len(handles),
+        frameon=False,
+    )

@@ -238,13 +238,18 @@ def _legend(
         if name in kinds
     ]
     styles: dict[str, Any] = {
-        "boundary of stable orbits": STABLE,
-        "of unstable ones only": UNSTABLE,
+        "bounds stable orbits": STABLE,
+        "unstable orbits only": UNSTABLE,
     }
     for meaning, style in styles.items():
         handles.append(Line2D([], [], color=GREY, linestyle=style, label=meaning))
-    if special:
+    relabels = [point.name.endswith(_RELABELS) for point in special]
+    if not all(relabels):
         ring = Line2D([], [], linestyle="none", marker="o", label="codimension two")
         ring.set(markersize=4.5, markerfacecolor="white", markeredgecolor=BLACK)
         handles.append(ring)
+    if any(relabels):
+        dot = Line2D([], [], linestyle="none", marker=".", label="T: segments relabelled")
+        dot.set(markersize=3.0, color=GREY)
+        handles.append(dot)
     ax.legend(handles=handles, fontsize=sized(SMALL), **where)

@@ -1,1 +1,1 @@
-"""Results of long calls, on disk and ahead of time: a run that was interrupted goes on from them."""
+"""Results of long functions, kept on disk or computed ahead on another core, so that a run can continue."""

@@ -1,4 +1,4 @@
-"""What a solution does under simulation: sweeps of a parameter, return maps, basins of attraction.
+"""Responses by simulation: sweeps of a parameter, return maps, basins of attraction, stable sets.
 
 ``docs/response.md`` has examples, what the numbers mean, and how to spread basins over machines.
 """

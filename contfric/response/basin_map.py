@@ -111,6 +111,12 @@ def basins(
     tile : starts in a tile
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Basins
+        ``labels``, shape (len, len), the number of the orbit that each start converges to (-1: none);
+        ``orbits``, and the ``shares`` of the grid with their confidence intervals.
+
     Raises
     ------
     ParameterError

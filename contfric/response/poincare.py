@@ -52,6 +52,11 @@ def poincare(
         points are collected, and before that
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    contfric.Returns
+        With k points: ``times``, shape (k,), and ``states``, shape (k, n).
+
     Raises
     ------
     ParameterError

@@ -78,6 +78,12 @@ def release_map(
     progress : callable, optional
         Called with one line now and then.
 
+    Returns
+    -------
+    ReleaseMap
+        With k releases: their ``phases``, ``images`` (phase of the next release) and ``returns`` (time until
+        then), all of shape (k,).
+
     Raises
     ------
     ParameterError

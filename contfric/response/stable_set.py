@@ -136,6 +136,11 @@ def stable_set(
     progress : callable, optional
         Called with one line of text now and then.
 
+    Returns
+    -------
+    StableSet
+        ``states``, both halves of the set as arrays of shape (k, 2), and why each ends.
+
     Raises
     ------
     ParameterError

@@ -119,6 +119,11 @@ def sweep(
     folder : where finished parts are kept; the same call goes on from them
     progress : called with one line of text now and then
 
+    Returns
+    -------
+    Sweep
+        ``up`` and ``down`` hold the points of each value of the parameter, its period and its outcome.
+
     Raises
     ------
     ParameterError

@@ -54,6 +54,8 @@ _KINDS = tuple(str(Saveable).split(" | "))
 FORMAT = 3
 
 _MARK = "contfric result"
+#: What :func:`contfric.export` writes: a result in a file of that name could not be read as one.
+_TABLES = (".csv", ".mat")
 _HEADER, _CONTENT, _DIGESTS = "header", "content", "digests"
 #: Bytes of a digest: damage by chance is missed once in 2**128 times.
 _SIZE = 16
@@ -70,6 +72,8 @@ def save(x: Saveable, path: str | Path) -> None:
     ------
     ResultFileError
         If the file cannot be written, or the object cannot be saved.
+    ParameterError
+        If the file has the suffix of another format.
 
     Examples
     --------
@@ -86,6 +90,8 @@ def save(x: Saveable, path: str | Path) -> None:
             f"only results can be saved ({', '.join(_KINDS)}), got {type(x).__name__}"
         )
     place = path_of("the file of a result", path)
+    if place.suffix in _TABLES:
+        raise ParameterError(f"cf.save writes .npz files, got {place}: for a table call cf.export")
     writer = ResultWriter(x.model)
     try:
         content = writer.bytes_of(x)
@@ -162,6 +168,11 @@ def load(path: str | Path, model: Model | None = None) -> Saveable:
     ----------
     model : Model, optional
         The model of the file; needed for one that is not known by its name.
+
+    Returns
+    -------
+    Orbit, Branch, Diagram or other result
+        The same numbers as were saved, to the last bit.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""Kernels compiled ahead of everybody who would wait for them, and those that come with a wheel."""
+"""Kernels that are compiled ahead: for ``contfric doctor --compile``, and for a wheel."""

@@ -1,4 +1,4 @@
-"""All kernels of the package: which are compiled, and compiling those that are not, before anybody waits.
+"""All kernels of the package: which are compiled, and the compilation of the others ahead of their use.
 
 A kernel is compiled when it is first needed, or here: ``contfric doctor --compile``, which ``make setup``
 calls. What belongs to one model is compiled with that model.

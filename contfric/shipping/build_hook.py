@@ -1,4 +1,4 @@
-"""Compile the kernels when a wheel is built, so that nobody who installs it waits for them.
+"""Compile the kernels when a wheel is built.
 
 Run by hatchling, never by contfric. Such a wheel is for one Python and one platform, and its kernels for one
 numba and one llvmlite: those of the environment that it is built in, so without build isolation

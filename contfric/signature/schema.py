@@ -52,6 +52,10 @@ def load_signature(source: SignatureLike, model: str | Model | None = None) -> S
     model : str or Model, optional
         The model that it must be of; needed for a model that has no entry point.
 
+    Returns
+    -------
+    Signature
+
     Raises
     ------
     NotationError

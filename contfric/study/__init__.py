@@ -1,4 +1,4 @@
-"""Studies: a YAML file that names what it wants, the plan that computes only that, the results.
+"""Studies: a YAML file that names the wanted results, the plan that computes only these, and their files.
 
 Importing this package is cheap: YAML, pydantic and the engine are imported when they are used.
 """

@@ -1,4 +1,4 @@
-"""Running a study: each step of its plan, and whatever happens, what was found is kept."""
+"""Running a study: each step of its plan; results are kept if it is interrupted."""
 
 from __future__ import annotations
 
@@ -49,6 +49,11 @@ def run_study(
         Whether results of an earlier run in that folder, or the checkpoint of another one, may be replaced.
     progress : callable, optional
         Called with one line of text now and then.
+
+    Returns
+    -------
+    StudyResult
+        ``found`` has the results, ``files`` what was written, ``info`` the record (``run.json``).
 
     Raises
     ------

@@ -97,7 +97,7 @@ resets:
   bottom: {to: late}
 """
     model = typed(tmp_path, text)
-    assert "motion in 'late' meets 'top'" in str(cf.check_model(model))
+    assert "a solution in 'late' meets 'top'" in str(cf.check_model(model))
     ends = cf.simulate(model, state=[0, 0], domain="late", periods=9)
     assert ends.end.name == "IMPOSSIBLE" and not ends.itinerary
 

@@ -121,7 +121,7 @@ def test_a_spike_that_is_just_touched_jumps(tmp_path) -> None:
     assert event.kind is cf.Kind.GS
     gain = abs(1.0 / ((1j + 0.3) ** 2 + 1.0))
     assert event.params["A"] == pytest.approx(1.0 / gain, abs=1e-10)
-    assert "takes motion somewhere else" in event.meaning and "the map jumps" in event.meaning
+    assert "leads to another place" in event.meaning and "the map jumps" in event.meaning
     assert diagram.verify().passed
 
 

@@ -127,7 +127,7 @@ def one_line(capsys) -> str:
         ("model: coulomb\nparams: {S: low}\n", ":2: parameter 'S' must be a finite number"),
         (HEAD + "explore: {parameter: Omega, range: [0.6, 0.4]}\n", ":3: the range [0.6, 0.4] is"),
         (HEAD + "explore: {parameter: Omega, range: [0.5, 0.5]}\n", ":3: the range [0.5, 0.5] is"),
-        ("model: [\n", ":2: no valid YAML"),
+        ("model: [\n", ":2: not valid YAML"),
     ],
 )
 @pytest.mark.parametrize("name", ["run", "explain"])
@@ -168,7 +168,7 @@ def test_bad_study(study, tmp_path, capsys, monkeypatch, name, text, message) ->
         (["simulate", "--domain", "stik"], "unknown domain 'stik'; did you mean 'stick'"),
         (["simulate", "--periods", "many"], "argument --periods: invalid number value: 'many'"),
         (["simulate", "--events", "0"], "--events: invalid whole number >= 1 value: '0'"),
-        (["info", "nowhere"], "nowhere is no folder of a run: cannot read nowhere/run.json"),
+        (["info", "nowhere"], "nowhere is not the folder of a run: cannot read nowhere/run.json"),
     ],
 )
 def test_bad_arguments(capsys, tmp_path, monkeypatch, arguments, message) -> None:

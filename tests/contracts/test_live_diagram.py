@@ -211,6 +211,12 @@ def test_packed_numbers_come_back(seed: int) -> None:
 # ------------------------------------------------------------------------ errors, the shell
 
 
+def test_a_page_has_the_suffix_of_one(diagram: cf.Diagram, tmp_path: Path) -> None:
+    with pytest.raises(cf.ParameterError, match=r"a page ends with \.html or \.htm, got .*x\.pdf"):
+        diagram.to_html(tmp_path / "x.pdf")
+    assert not list(tmp_path.iterdir())
+
+
 def test_without_bokeh_one_line_names_the_extra(
     diagram: cf.Diagram, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -217,7 +217,10 @@ def test_plot_shades_what_is_positive(lmap: cf.LyapunovMap) -> None:
     assert r"\lambda" in mesh.colorbar.ax.get_ylabel()
     legend = ax.get_legend()
     assert legend is not None  # S = 0.45 is outside of the model
-    assert [text.get_text() for text in legend.get_texts()] == ["no exponent"]
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "no positive exponent",
+        "no exponent",
+    ]
 
 
 def test_plot_on_axes_of_the_caller(lmap: cf.LyapunovMap) -> None:
@@ -230,7 +233,8 @@ def test_plot_on_axes_of_the_caller(lmap: cf.LyapunovMap) -> None:
 def test_plot_without_chaos_and_of_one_row() -> None:
     regular = cf.lyapunov_map("coulomb", {"Omega": [0.5], "S": [0.3, 0.32]}, FIXED, periods=50)
     ax = regular.plot()
-    assert ax.get_legend() is None
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == ["no positive exponent"]  # what white means
 
 
 # ----------------------------------------------------------------------------------- errors

@@ -88,7 +88,7 @@ MISTAKES = [
         "",
         Topic.TRANSITIONS,
         "error",
-        "motion is caught there",
+        "the solution is caught there",
     ),
     ("in: {v: 0, F+: -, F-: +}", "in: {v: 0}", Topic.SLIDING, "warning", "'stick' is never left"),
     (

@@ -169,6 +169,7 @@ MISTAKES = [
     ),
     ("v: -u - S", "v: -2u - S", 15, "a product needs its * (in '2u')"),
     ("v: -u - S", "v: -S u - S", 15, "a product needs its * (in 'S u')"),
+    ("v: -u - S", "v: -if(u) - S", 15, "a choice is written where(condition, a, b)"),
 ]
 
 

@@ -208,6 +208,14 @@ def test_truncated_file(diagram, tmp_path, share) -> None:
         cf.load(path)
 
 
+@pytest.mark.parametrize("name", ["orbit.csv", "orbit.mat"])
+def test_a_table_is_not_saved_but_exported(orbit, tmp_path, name) -> None:
+    with pytest.raises(cf.ParameterError, match=r"writes \.npz files, .*call cf\.export"):
+        cf.save(orbit, tmp_path / name)
+    assert not list(tmp_path.iterdir())
+    assert cf.export(orbit, tmp_path / name)
+
+
 def test_every_changed_byte_is_found_or_harmless(orbit, tmp_path) -> None:
     path = tmp_path / "orbit.npz"
     cf.save(orbit, path)

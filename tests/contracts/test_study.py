@@ -43,7 +43,7 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
     [
         # YAML
         ("", 1, "must be a mapping"),
-        ("model: [\n", 2, "no valid YAML"),
+        ("model: [\n", 2, "not valid YAML"),
         (HEAD + "model: coulomb\n", 3, r"key 'model' is given twice \(first in line 1\)"),
         # unknown itineraries
         (HEAD + "exlpore: {}\n", 3, "unknown key 'exlpore'; did you mean 'explore'"),

@@ -96,5 +96,7 @@ def test_a_comma_in_a_study_is_explained(tmp_path) -> None:
 
 
 def test_a_colon_in_a_text_is_explained(tmp_path) -> None:
-    with pytest.raises(cf.StudyError, match=r":1: no valid YAML: .*; a text with ': ' in it needs"):
+    with pytest.raises(
+        cf.StudyError, match=r":1: not valid YAML: .*; a text with ': ' in it needs"
+    ):
         read_study(write(tmp_path, "title: friction: a study\nmodel: coulomb\n"))

@@ -54,8 +54,8 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
                 if not pole:
                     report.warn(
                         Topic.CONTINUITY,
-                        f"{what} in mode '{mode.name}' has a pole {where}: motion that comes there cannot be "
-                        "followed. If none does, this is no fault",
+                        f"{what} in mode '{mode.name}' has a pole {where}: a solution that comes there "
+                        "cannot be followed. If none does, this is no fault",
                     )
                 pole = True
                 continue
@@ -113,8 +113,8 @@ def _without_values(report: ModelReport, probe: Probe) -> bool:
         else:
             report.warn(
                 Topic.CONTINUITY,
-                f"{text} (one of {len(without)} such among {len(places)}): motion that comes there cannot be "
-                "followed. If none does, this is no fault",
+                f"{text} (one of {len(without)} such among {len(places)}): a solution that comes there "
+                "cannot be followed. If none does, this is no fault",
             )
         return True
     return False

@@ -61,6 +61,6 @@ def _compare(
     if held:
         report.note(
             Topic.SLIDING,
-            f"'{mode.name}' holds motion on '{surface}' where the fields on both sides lead away, too: a "
+            f"'{mode.name}' keeps solutions on '{surface}' where the fields on both sides lead away, too: a "
             "static limit above the kinetic one",
         )

@@ -160,5 +160,5 @@ def check_two_folds(report: ModelReport, probe: Probe) -> None:
         report.note(
             Topic.TWO_FOLDS,
             f"two-fold on '{fold.surface}' between '{fold.above}' and '{fold.below}', {fold.kind.value}, "
-            f"at {where}{when}{wide}: motion that comes through it need not be unique",
+            f"at {where}{when}{wide}: a solution that comes through it need not be unique",
         )

@@ -1,4 +1,4 @@
-"""Modes that end where nothing is behind them, at resets of others or at limits that cross, or never end."""
+"""Modes that end where no mode follows, at resets of others or at limits that cross, or never end."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def check_passages(report: ModelReport, probe: Probe) -> None:
             acts = " or ".join(probe.model.reset_by_surface[surface].modes)
             report.warn(
                 Topic.RESETS,
-                f"motion in '{mode}' meets '{surface}', where its mode ends, and the reset there acts in "
-                f"{acts} only: motion passes it unchanged, and no mode is behind it. Add one, or "
-                f"leave '{surface}' out of the 'in' of '{mode}', which then ends at another surface",
+                f"a solution in '{mode}' meets '{surface}', where its mode ends, and the reset there acts in "
+                f"{acts} only: the solution crosses it unchanged, and no mode is on the other side. Add "
+                f"one, or leave '{surface}' out of the 'in' of '{mode}', which then ends at another surface",
             )
 
 
@@ -47,7 +47,7 @@ def other_side(model: Model, reset: Reset, before: Domain) -> str:
     if not others or before.own_mode in others:
         return ""
     return (
-        f"; or, if motion passes '{reset.surface}' unchanged in '{before.own_mode}', write "
+        f"; or, if solutions cross '{reset.surface}' unchanged in '{before.own_mode}', write "
         f"'from: [{', '.join(others)}]' to the reset"
     )
 

@@ -1,4 +1,4 @@
-"""Whether motion comes to states at which a model is at fault: asked of a few simulations.
+"""Whether solutions come to states at which a model is at fault: a few simulations tell.
 
 States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
 simulation meets such a fault, else a warning.
@@ -26,7 +26,7 @@ _PERIODS, _EVENTS = 100.0, 400
 _SAMPLES, _BEYOND = 200, 1e-6
 #: What is said of a fault that no simulation meets, and of one that some do, where no ranges are given.
 NOT_MET = (
-    ". None of {count} simulations came to such a state: if motion never does, this is no fault, and ranges "
+    ". None of {count} simulations came to such a state: if solutions never do, this is no fault, and ranges "
     "of the states say so (spread: {{{state}: [lowest, highest]}})"
 )
 DRAWN = (

@@ -14,7 +14,7 @@ class Topic(str, Enum):
 
     DERIVATIVES = "compiled values and derivatives against the formulas"
     SURFACES = "surfaces are regular: the gradient does not vanish on them"
-    TRANSITIONS = "every crossing that motion makes has a next domain, which it can enter"
+    TRANSITIONS = "every crossing that solutions make has a next domain, which they can enter"
     REACHED = "every mode is entered from another one"
     RESETS = "a reset leads into a domain, and away from the surfaces that it is on there"
     CONTINUITY = "fields and observables do not jump inside of a mode"

@@ -39,7 +39,7 @@ def check_reached(report: ModelReport, probe: Probe) -> None:
         if not entered:
             report.warn(
                 Topic.REACHED,
-                f"nothing leads into mode '{mode}' from another one: motion is in it only if it starts "
+                f"nothing leads into mode '{mode}' from another one: a solution is in it only if it starts "
                 "there. Correct the sides of the modes, or lead a reset to it ('to: ...')",
             )
 

@@ -43,7 +43,7 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
             report.warn(
                 Topic.SURFACES,
                 f"no state was found on surface '{surface.name}' ({surface.observable} = "
-                f"{surface.level}): if motion reaches it, enlarge 'spread'; else leave it out",
+                f"{surface.level}): if solutions reach it, enlarge 'spread'; else leave it out",
             )
 
 
@@ -144,7 +144,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                 report.warn(
                     Topic.TRANSITIONS,
                     f"the limit '{limit}+' lies below '{limit}-' at some states: a friction limit that is "
-                    "negative. Where motion comes there (a normal force vanishes) the model does not hold",
+                    "negative. Where solutions come there (a normal force vanishes) the model does not hold",
                 )
                 continue
             if following is None and name in entered:
@@ -152,7 +152,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
             if following is None and name not in entered:
                 report.note(
                     Topic.TRANSITIONS,
-                    f"motion that starts in '{name}' meets '{surface.name}' and no domain follows: "
+                    f"a solution that starts in '{name}' meets '{surface.name}' and no domain follows: "
                     f"{_sides(signs)}. Nothing else leads there",
                 )
                 return
@@ -161,8 +161,8 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                     report,
                     probe,
                     Topic.TRANSITIONS,
-                    f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)}, and no "
-                    f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (motion "
+                    f"a solution in '{name}' meets '{surface.name}' at {_place(probe, t, y)}, and no "
+                    f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (it "
                     "stays), or one on the other side",
                 )
                 return
@@ -194,8 +194,8 @@ def _goes_on(
         report,
         probe,
         Topic.TRANSITIONS,
-        f"motion in '{name}' meets '{surface.name}' at {_place(probe, t, y)} and should go on in "
-        f"'{following}', whose field leads back to the surface: motion is caught there. Add a mode "
+        f"a solution in '{name}' meets '{surface.name}' at {_place(probe, t, y)} and should go on in "
+        f"'{following}', whose field leads back to the surface: the solution is caught there. Add a mode "
         f"with {surface.name}: 0 (it slides on the surface), with the condition under which it stays",
     )
     return False

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.base.extras import need_bokeh
 from contfric.base.files import replacing
+from contfric.errors import ParameterError
 from contfric.plot.diagram import fixed_parameters
 from contfric.plot.live.collect import Detail, collect, symbol
 from contfric.plot.names import parameter_label
@@ -75,8 +76,13 @@ def write_page(diagram: Diagram, path: str | PathLike[str]) -> Path:
         If bokeh is not installed.
     ResultFileError
         If the file cannot be written.
+    ParameterError
+        If its name does not end with .html or .htm.
     """
-    text, file = page_of(diagram), Path(path)
+    file = Path(path)
+    if file.suffix not in (".html", ".htm"):
+        raise ParameterError(f"a page ends with .html or .htm, got {file}")
+    text = page_of(diagram)
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return file
