@@ -99,7 +99,7 @@ contracts: $(STAMP)
 # one processor has while the other reads types.
 bytecode: $(TESTS_STAMP)
 
-$(TESTS_STAMP): $(STAMP) $(shell find tests -name '*.py')
+$(TESTS_STAMP): $(STAMP) $(shell find tests -name '*.py') | kernels
 	@echo "== bytecode of tests"
 	@$(BIN)/python -m pytest --collect-only -qq > /dev/null || true # what is wrong pytest itself says
 	@touch $@
