@@ -7,6 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 BENCH_STAMP := $(VENV)/.bench-installed
 DOCS_STAMP := $(VENV)/.docs-installed
+TESTS_STAMP := $(VENV)/.tests-compiled
 SITE := site
 DEMO := demo
 STRESS := .stress
@@ -19,7 +20,7 @@ install = { $(PIP) uv && $(BIN)/uv pip install --quiet --python $(BIN)/python --
 	    || $(PIP) --editable '.[$(1)]'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup kernels wheel demo test lint types contracts unit pytest test-all gate bench stress studies gallery docs notebooks clean
+.PHONY: help setup kernels bytecode wheel demo test lint types contracts unit pytest test-all gate bench stress studies gallery docs notebooks clean
 MAKEFLAGS += --no-print-directory
 # What is imported is compiled once, not by each of the programs that the tests start, even where this is set:
 # without its bytecode scipy alone takes three times as long to load.
@@ -77,7 +78,7 @@ demo: $(STAMP)
 
 # What can be done at once, then pytest: its closing line is the last line.
 test: $(STAMP)
-	@$(MAKE) -j$(WORKERS) --output-sync=target lint types contracts kernels
+	@$(MAKE) -j$(WORKERS) --output-sync=target types lint contracts kernels bytecode
 	@$(MAKE) pytest
 
 lint: $(STAMP)
@@ -93,6 +94,15 @@ types: $(STAMP)
 contracts: $(STAMP)
 	@echo "== lint-imports"
 	@$(BIN)/lint-imports
+
+# pytest compiles each file of tests when it is first read, and each of its workers would: half a minute, which
+# one processor has while the other reads types.
+bytecode: $(TESTS_STAMP)
+
+$(TESTS_STAMP): $(STAMP) $(shell find tests -name '*.py') | kernels
+	@echo "== bytecode of tests"
+	@$(BIN)/python -m pytest --collect-only -qq > /dev/null || true # what is wrong pytest itself says
+	@touch $@
 
 unit: $(STAMP) kernels
 	@$(MAKE) pytest

@@ -7,7 +7,6 @@ from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +16,6 @@ from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
-from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import Place, Tile, TileRows, compute_tile, empty_tile, inside, places
 from contfric.chaos.work import Work
 from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
@@ -25,6 +23,7 @@ from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.time_scale import has_clock
+from contfric.remember.folder import kept_in
 
 #: Bytes of a solution in a map beyond its exponents and its initial state.
 _BYTES = 24
@@ -82,7 +81,7 @@ def lyapunov_map(
     ParameterError
         If an argument is not valid, or the model is defined nowhere on the grid.
     ResultFileError
-        If the folder holds tiles of another map, or cannot be written.
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -108,23 +107,9 @@ def lyapunov_map(
     varied = model.index_of(names[0]), model.index_of(names[1])
     at = checked_time(time)
     whole = Tile(model, limits, vector, varied, (values[0], values[1]), count, states, at)
-    kept = None if folder is None else open_tiles(folder, _record(whole, grid, tile))
-    return LyapunovMap(model, grid, vector, _computed(whole, tile, executor, kept, progress))
-
-
-def _record(whole: Tile, grid: Mapping[str, FloatArray], side: int) -> dict[str, Any]:
-    """Describe the map, so that tiles of another one, or of another version, are not taken for its."""
-    return {
-        **versions(whole.model),
-        "params": whole.model.mapping(whole.vector),
-        "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in grid.items()},
-        "grid": digest(*grid.values()),
-        "starts": whole.starts,
-        "states": digest(whole.states) if whole.states is not None else "default",
-        "time": whole.time,
-        "limits": list(whole.limits),
-        "tile": side,
-    }
+    with kept_in(folder):
+        rows = _computed(whole, tile, executor, progress)
+    return LyapunovMap(model, grid, vector, rows)
 
 
 def check_size(shape: tuple[int, ...], starts: int, n: int) -> None:
@@ -147,15 +132,12 @@ def _computed(
     whole: Tile,
     side: int,
     executor: Executor | None,
-    kept: TileFolder | None,
     progress: Progress | None,
 ) -> TileRows:
     rows, cut = empty_tile(whole.shape, len(whole.model.states)), list(places(whole.shape, side))
     work: Work[Tile, TileRows] = Work(
         "Lyapunov map",
-        TileRows,
         compute_tile,
-        kept,
         executor,
         progress,
         prepare=lambda: _compile(whole.model),

@@ -100,12 +100,6 @@ class Tile(TileTask):
         vectors[:, :, self.varied[1]] = self.values[1][None, :]
         return vectors.reshape(rows * columns, -1)
 
-    def fits(self, rows: TileRows) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        like = empty_tile(self.shape, len(self.model.states))
-        pairs = ((getattr(rows, name), wanted) for name, wanted in vars(like).items())
-        return all(a.shape == b.shape and a.dtype == b.dtype for a, b in pairs)
-
 
 def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """Tell where a model is defined; its parameters are numbers or arrays that make up ``shape``."""

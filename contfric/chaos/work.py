@@ -7,20 +7,17 @@ process keeps it, so that what belongs to it (the tables of its transitions) is 
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from contfric.chaos.running import Compute, Progress, Timer, compute_all
-from contfric.chaos.store import TileFolder
 from contfric.errors import ParameterError
 from contfric.models import load_model
 from contfric.models.definition import Model
-
-if TYPE_CHECKING:
-    import numpy as np
+from contfric.remember.journal import Parts
 
 R = TypeVar("R")
 T = TypeVar("T", bound="TileTask")
@@ -34,10 +31,6 @@ class TileTask:
     def __reduce__(self) -> tuple[Any, ...]:
         model, *rest = (getattr(self, field.name) for field in fields(self))  # type: ignore[arg-type]
         return _rebuilt, (type(self), packed(model), *rest)
-
-    def fits(self, rows: Any) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        raise NotImplementedError
 
 
 def _rebuilt(kind: type[TileTask], model: str | bytes, *rest: Any) -> TileTask:
@@ -62,17 +55,6 @@ def unpacked(model: str | bytes) -> Model:
     return found
 
 
-def kept_rows(
-    kind: type[R], arrays: Mapping[str, np.ndarray[Any, Any]] | None, fits: Callable[[R], bool]
-) -> R | None:
-    """Return the rows of a class that were kept as these arrays; None if they do not fit."""
-    names = {field.name for field in fields(kind)}  # type: ignore[arg-type]
-    if arrays is None or arrays.keys() != names:
-        return None
-    rows = kind(**arrays)
-    return rows if fits(rows) else None
-
-
 @dataclass(frozen=True, eq=False)
 class Work(Generic[T, R]):
     """How tasks of one kind are finished.
@@ -80,49 +62,43 @@ class Work(Generic[T, R]):
     Attributes
     ----------
     what : what they are parts of, for messages
-    rows : class of the rows of a task, a data class of arrays
     compute : returns the rows of a task
-    folder : where finished ones are kept
     executor, threads : as :func:`contfric.chaos.running.compute_all` takes them
     prepare : called before any is computed
     """
 
     what: str
-    rows: type[R]
     compute: Compute
-    folder: TileFolder | None
     executor: Executor | None
     progress: Progress | None
     threads: int | None = None
     prepare: Callable[[], None] = lambda: None
 
     def finish(self, tasks: Sequence[T], put: Callable[[int, R], None]) -> None:
-        """Hand the rows of each task to ``put``, by its number.
+        """Hand the rows of each task to ``put``, by its number; they are kept where a journal is.
 
         Raises
         ------
         KeyboardInterrupt
             On Ctrl-C; what was finished has been handed over.
         """
-        left = {}
+        left, kept = {}, Parts(self.what)
         for number, task in enumerate(tasks):
-            arrays = None if self.folder is None else self.folder.read(number)
-            rows = kept_rows(self.rows, arrays, task.fits)
+            rows = kept.get(task)
             if rows is None:
                 left[number] = task
             else:
                 put(number, rows)
         timer = Timer(len(tasks), len(tasks) - len(left), self.progress, self.what)
-        if self.folder is not None and timer.done:
-            timer.say(f"{timer.done} of {timer.total} tiles are in {self.folder.path} already")
+        if timer.done:
+            timer.say(f"{timer.done} of {timer.total} tiles are in {kept.folder} already")
         try:
             if left:
                 self.prepare()
             for number, found in compute_all(
                 left, self.executor, timer.say, self.compute, self.threads
             ):
-                if self.folder is not None:
-                    self.folder.write(number, vars(found))
+                kept.put(tasks[number], found)
                 put(number, found)
                 timer.tick()
         except KeyboardInterrupt:

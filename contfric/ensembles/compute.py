@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, check_executor
-from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.work import Work
 from contfric.ensembles.drawing import Varied, checked_distributions
 from contfric.ensembles.ensemble import Ensemble
@@ -34,6 +33,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.quantities.registry import number_quantity
+from contfric.remember.folder import kept_in
 
 if TYPE_CHECKING:
     from contfric.study.read import Study
@@ -104,7 +104,7 @@ def ensemble(
     ParameterError
         If an argument is not valid.
     ResultFileError
-        If the folder holds tiles of another ensemble, or cannot be written.
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -144,8 +144,8 @@ def ensemble(
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
     side = whole_number("tile", tile, least=1)
     whole = EnsembleTile(model, vectors, parameter, bounds, row, grid, options)
-    kept = None if folder is None else open_tiles(folder, _record(whole, side))
-    rows = _computed(whole, side, executor, kept, progress)
+    with kept_in(folder):
+        rows = _computed(whole, side, executor, progress)
     texts = dict(zip(varied.names, varied.texts, strict=True))
     return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)
 
@@ -198,33 +198,17 @@ def _vector(
     return vector
 
 
-def _record(whole: EnsembleTile, side: int) -> dict[str, Any]:
-    """Describe the ensemble, so that tiles of another one are not taken for its."""
-    return {
-        **versions(whole.model),
-        "kind": "ensemble",
-        "samples": digest(whole.vectors),
-        "parameter": whole.parameter,
-        "range": list(whole.range),
-        "row": whole.row,
-        "values": digest(whole.values),
-        "options": whole.options,
-        "tile": side,
-    }
-
-
 def _computed(
     whole: EnsembleTile,
     side: int,
     executor: Executor | None,
-    kept: TileFolder | None,
     progress: Progress | None,
 ) -> Rows:
     vectors = np.split(whole.vectors, range(side, len(whole.vectors), side))
     rows = [Rows.empty(len(part)) for part in vectors]
     # a tile is Python, which holds the lock
     work: Work[EnsembleTile, Rows] = Work(
-        "ensemble", Rows, compute_ensemble_tile, kept, executor, progress, threads=1
+        "ensemble", compute_ensemble_tile, executor, progress, threads=1
     )
     with suppress(KeyboardInterrupt):
         work.finish([replace(whole, vectors=part) for part in vectors], rows.__setitem__)

@@ -50,16 +50,6 @@ class Rows:
     orbit_stable: NDArray[np.int8]
     orbit_row: NDArray[np.float64]
 
-    def fits(self, count: int) -> bool:
-        """Tell whether these are the rows of ``count`` samples."""
-        like = vars(Rows.empty(0))
-        lengths = {"event": len(self.event_sample), "orbit": len(self.orbit_sample)}
-        return all(
-            array.shape == (lengths.get(name.split("_")[0], count),)
-            and array.dtype.kind == like[name].dtype.kind
-            for name, array in vars(self).items()
-        )
-
     @classmethod
     def empty(cls, count: int) -> Rows:
         """Return rows of samples that are not computed."""

@@ -53,10 +53,6 @@ class EnsembleTile(TileTask):
     values: FloatArray
     options: dict[str, Any]
 
-    def fits(self, rows: Rows) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        return rows.fits(len(self.vectors))
-
 
 def compute_ensemble_tile(tile: EnsembleTile, stop: IntArray | None = None) -> Rows:
     """Explore the samples of a tile; ``stop`` is set by Ctrl-C, and ends it between two of them.

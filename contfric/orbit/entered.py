@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -46,14 +46,22 @@ class StartState:
         return self.model.view(self.vector)
 
     @cached_property
-    def _sizes(self) -> dict[str, float]:
+    def heights(self) -> dict[str, float]:
+        """How far the state is above each surface."""
+        surfaces, view = self.model.surfaces, self._view
+        seen = {s.observable: 0.0 for s in surfaces}
+        seen = {name: view.observe(name, self.t, self.y) for name in seen}
+        return {s.name: seen[s.observable] - view.level(s.name) for s in surfaces}
+
+    @cached_property
+    def _terms(self) -> dict[str, float]:
         return {}
 
     @cached_property
     def _widths(self) -> FloatArray:
         """How large the time and the states are, or are where a solution moves."""
-        spread = np.abs(self.model.spread(self.model.mapping(self.vector)))
-        return np.array([abs(self.t), *(np.abs(self.y) + spread)])
+        spread = _spread(self.model, self.vector.tobytes())
+        return np.array([abs(self.t), *(np.abs(self.y) + spread).tolist()])
 
     @cached_property
     def _unit(self) -> float:
@@ -62,17 +70,15 @@ class StartState:
 
     def _size(self, surface: Surface) -> float:
         """Return what the height over a surface is summed up from: its rounding is relative to that."""
-        found = self._sizes.get(surface.name)
+        found = self._terms.get(surface.observable)
         if found is None:
             terms = self._view.gradient(surface.observable, self.t, self.y)
-            found = abs(self._view.level(surface.name)) + float(np.abs(terms) @ self._widths)
-            self._sizes[surface.name] = found
-        return found
+            found = self._terms[surface.observable] = float(np.abs(terms) @ self._widths)
+        return abs(self._view.level(surface.name)) + found
 
     def lies_on(self, name: str) -> bool:
         """Tell whether the state lies on a surface, but for rounding."""
-        surface = self.model.surface_by_name[name]
-        return abs(self._view.height(name, self.t, self.y)) <= _ON * self._size(surface)
+        return abs(self.heights[name]) <= _ON * self._size(self.model.surface_by_name[name])
 
     def side_ahead(self, mode: str, name: str) -> int:
         """Return the side of a surface that the solution of a mode leads to; 0 if it stays on it."""
@@ -103,6 +109,12 @@ class StartState:
         for name, side in domain.signs.items():
             if side != 0 and (self.model.cuts(name) or name in bounds) and self.lies_on(name):
                 yield name, side
+
+
+@lru_cache(maxsize=64)
+def _spread(model: Model, vector: bytes) -> FloatArray:
+    """Return the natural sizes of the states; many starts are tried at the same parameters."""
+    return np.abs(model.spread(model.mapping(np.frombuffer(vector))))
 
 
 def entered_domain(

@@ -212,9 +212,9 @@ def stretches(
     if not has_sections(model, system.itinerary):  # it passes them without joints
         kept = [i for i, pair in enumerate(itinerary) if pair not in model.sections]
         itinerary, points = tuple(itinerary[i] for i in kept), points[kept]
-    closure, turn = system.layout.closure, system.layout.turn * period
+    closure, turn, first = system.layout.closure, system.layout.turn * period, system.itinerary[0]
     for i in range(1, len(itinerary) - count + 1):
-        if itinerary[i : i + count] != system.itinerary:
+        if itinerary[i] != first or itinerary[i : i + count] != system.itinerary:
             continue
         joints = clocked(model, points[i - 1 : i - 1 + count].copy(), points[i - 1 + count, 0])
         gap = points[i - 1 + count, 1:] - joints[0, 1:] @ closure.T

@@ -44,7 +44,7 @@ def start_of(
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     start = StartState(model, t, y, vector)
-    exact = signs_at(model, t, y, vector)
+    exact = {k: int(np.sign(h)) for k, h in start.heights.items()} | model.settled_sides
     signs = exact | {k: 0 for k in exact if k not in model.settled_sides and start.lies_on(k)}
     given: object = domain  # whatever the user gave
     if given is not None and not (isinstance(given, str) and given in model.domain_by_name):

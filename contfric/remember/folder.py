@@ -30,7 +30,7 @@ def kept_in(folder: str | Path | None) -> Iterator[None]:
         return
     path = made_folder("the folder of finished parts", folder)
     file = path / _NAME
-    if file.exists() and not belongs(file, program()):
+    if file.exists() and not (file.is_file() and belongs(file, program())):
         raise ResultFileError(
             f"{path} holds parts of another version of contfric, numpy, scipy or numba: use another folder"
         )

@@ -16,6 +16,7 @@ import inspect
 import json
 import os
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -93,6 +94,7 @@ class Journal:
         except BaseException:
             os.close(self._file)
             raise
+        _OPEN.add(self)
 
     def __len__(self) -> int:
         return len(self._places)
@@ -161,6 +163,20 @@ class Journal:
             pieces.append(piece)
             size -= len(piece)
         return b"".join(pieces)
+
+
+#: Journals that are open.
+_OPEN: weakref.WeakSet[Journal] = weakref.WeakSet()
+
+
+def _let_go() -> None:
+    """Close all journals, in a process that was forked: while it has their files they are locked."""
+    for journal in list(_OPEN):
+        journal.close()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)
 
 
 def _first_line(belongs_to: str) -> bytes:
@@ -244,9 +260,9 @@ def remembered(
             def question() -> tuple[bytes, Writer]:
                 bound = signature.bind(*args, **kwargs)
                 bound.apply_defaults()
-                inputs = Writer()
-                asked = {k: v for k, v in bound.arguments.items() if k not in without}
-                return digest_of(inputs.bytes_of([name, asked])), inputs
+                return _question(
+                    name, {k: v for k, v in bound.arguments.items() if k not in without}
+                )
 
             def compute() -> R:
                 return function(*args, **kwargs)
@@ -266,6 +282,47 @@ def remembered(
         return call
 
     return mark
+
+
+class Parts:
+    """Parts of a computation that are computed elsewhere, in the journal that is kept, if there is one.
+
+    Parameters
+    ----------
+    name : of the computation
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name, self._journal = name, _KEPT.get()
+
+    @property
+    def folder(self) -> Path | None:
+        """Where they are kept; None if nowhere."""
+        return None if self._journal is None else self._journal.path.parent
+
+    def get(self, part: Any) -> Any:
+        """Return the result of a part; None if it has not been kept."""
+        if self._journal is None:
+            return None
+        try:
+            found = _looked_up(self._journal, *_question(self._name, part))
+        except UnstorableError:
+            return None
+        return found and found[0]
+
+    def put(self, part: Any, result: Any) -> None:
+        """Keep the result of a part."""
+        if self._journal is not None:
+            with suppress(UnstorableError):
+                key, inputs = _question(self._name, part)
+                # where it was computed, its work was counted there
+                self._journal.put(key, Writer(inputs.objects).bytes_of((result, 0)))
+
+
+def _question(name: str, asked: Any) -> tuple[bytes, Writer]:
+    """Return the key of a call, and the writer that has the objects in it."""
+    inputs = Writer()
+    return digest_of(inputs.bytes_of([name, asked])), inputs
 
 
 def _given(found: tuple[Any]) -> Any:

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor, duration
 from contfric.chaos.status import Motion
-from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.work import Work
 from contfric.errors import (
     ParameterError,
@@ -31,6 +30,7 @@ from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.system import IntArray
+from contfric.remember.folder import kept_in
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
 from contfric.response.basins import Basins
@@ -122,7 +122,7 @@ def basins(
     ParameterError
         If an argument is not valid.
     ResultFileError
-        If the folder holds tiles of another computation, or cannot be written.
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -153,10 +153,10 @@ def basins(
         np.full(len(states), Motion.MISSING.code, dtype=np.uint8),
     )
     try:
-        _find_by_seeds(job, attractors)
-        kept = None if folder is None else open_tiles(folder, _record(job, attractors, axes))
-        _label(job, attractors, np.arange(len(states)), rows, kept)
-        _resolve(job, attractors, rows)
+        with kept_in(folder):
+            _find_by_seeds(job, attractors)
+            _label(job, attractors, np.arange(len(states)), rows)
+            _resolve(job, attractors, rows)
     except KeyboardInterrupt:
         if progress is not None:
             progress("interrupted: what is labelled is kept")
@@ -233,23 +233,6 @@ def _states(model: Model, axes: Mapping[str, FloatArray], at: Mapping[str, float
     return states.reshape(-1, len(model.states))
 
 
-def _record(
-    job: _BasinJob, attractors: Attractors, axes: Mapping[str, FloatArray]
-) -> dict[str, Any]:
-    """Describe the computation, so that tiles of another one are not taken for its."""
-    return {
-        **versions(attractors.model),
-        "kind": "basins",
-        "params": attractors.model.mapping(job.vector),
-        "axes": {n: [float(v[0]), float(v[-1]), len(v)] for n, v in axes.items()},
-        "states": digest(job.states),
-        "orbits": digest(*attractors.targets),
-        "time": job.time,
-        "limits": [job.periods],
-        "tile": job.side,
-    }
-
-
 def _chattering(rows: BasinRows) -> IntArray:
     """Return the starts whose impacts follow each other faster and faster, and that do not go on."""
     return np.flatnonzero(rows.motions == Motion.CHATTER.code)
@@ -302,17 +285,11 @@ def _search(
     return left, False
 
 
-def _label(
-    job: _BasinJob,
-    attractors: Attractors,
-    chosen: IntArray,
-    rows: BasinRows,
-    kept: TileFolder | None,
-) -> None:
+def _label(job: _BasinJob, attractors: Attractors, chosen: IntArray, rows: BasinRows) -> None:
     """Label some starts, tile by tile, as any executor computes them."""
     parts = job.parts(chosen)
     work: Work[BasinTile, BasinRows] = Work(
-        "basins", BasinRows, compute_basin_tile, kept, job.executor, job.progress
+        "basins", compute_basin_tile, job.executor, job.progress
     )
     tiles = [job.tile(attractors, part) for part in parts]
     work.finish(tiles, lambda k, found: _put(rows, parts[k], found))
@@ -328,11 +305,11 @@ def _resolve(job: _BasinJob, attractors: Attractors, rows: BasinRows) -> None:
     """Find the orbits of what is periodic and unknown, until nothing is left that has one."""
     chattering = _chattering(rows)
     if len(chattering) and attractors.rest_at_walls():
-        _label(job, attractors, chattering, rows, None)
+        _label(job, attractors, chattering, rows)
     left, tries = _unknown(rows), 1
     while len(left):
         left, new = _search(job, attractors, left, tries)
         if new:
-            _label(job, attractors, left, rows, None)
+            _label(job, attractors, left, rows)
             left = np.intersect1d(left, _unknown(rows))
         tries *= 2

@@ -55,11 +55,6 @@ class BasinTile(TileTask):
     states: FloatArray
     periods: int
 
-    def fits(self, rows: BasinRows) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        shaped = rows.labels.shape == rows.motions.shape == (len(self.states),)
-        return shaped and rows.labels.dtype == np.int32
-
 
 def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRows:
     """Compute a tile; what it returns depends on nothing but the task."""

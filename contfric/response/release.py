@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor
-from contfric.chaos.store import digest, open_tiles, versions
 from contfric.chaos.work import Work
 from contfric.errors import (
     ParameterError,
@@ -26,6 +25,7 @@ from contfric.models.tied import tied
 from contfric.orbit.structure import mirror_mode
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
+from contfric.remember.folder import kept_in
 from contfric.response.release_tile import ReleaseRows, ReleaseTile, compute_release_tile
 from contfric.response.returns import ReleaseMap
 from contfric.response.sweeping import compiled, positive
@@ -123,14 +123,14 @@ def release_map(
         *(times.copy(), states.reshape(-1, len(model.states)).copy()),
         positive("periods", periods),
     )
-    kept = None if folder is None else open_tiles(folder, _record(whole, tile))
     work: Work[ReleaseTile, ReleaseRows] = Work(
-        *("release map", ReleaseRows, compute_release_tile, kept, executor, progress),
+        *("release map", compute_release_tile, executor, progress),
         prepare=lambda: compiled(model),
     )
     parts = [slice(first, first + tile) for first in range(0, len(times), tile)]
     rows = ReleaseRows.empty(len(times), len(model.states))
-    work.finish([whole.part(part) for part in parts], lambda k, got: rows.put(parts[k], got))
+    with kept_in(folder):
+        work.finish([whole.part(part) for part in parts], lambda k, got: rows.put(parts[k], got))
     found = rows.found
     returns, images = np.full(len(times), np.nan), np.full(len(times), np.nan)
     returns[found] = (rows.times + rows.cycles * period - times)[found]
@@ -139,19 +139,6 @@ def release_map(
     branch = _branches(rows.itineraries, times, images, 1.5 * period / count, period)
     names = model.modes[release.mode].name, model.surfaces[release.surface].name
     return ReleaseMap(model, vector, *names, period, times, images, returns, branch, states)
-
-
-def _record(whole: ReleaseTile, tile: int) -> dict[str, Any]:
-    """Describe the map, so that tiles of another one are not taken for its."""
-    return {
-        **versions(whole.model),
-        "kind": "release map",
-        "params": whole.model.mapping(whole.vector),
-        "releases": digest(whole.joints, whole.times, whole.states),
-        "starts": [whole.following, whole.on],
-        "limits": [whole.periods],
-        "tile": tile,
-    }
 
 
 def release_of(model: Model, surface: str | None) -> tuple[_WayOutOfRest, str]:

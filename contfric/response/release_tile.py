@@ -74,11 +74,6 @@ class ReleaseTile(TileTask):
         """Return some of the releases."""
         return replace(self, times=self.times[part].copy(), states=self.states[part].copy())
 
-    def fits(self, rows: ReleaseRows) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        shaped = rows.found.shape == rows.cycles.shape == rows.times.shape == self.times.shape
-        return shaped and rows.states.shape == self.states.shape and rows.found.dtype == bool
-
 
 def compute_release_tile(task: ReleaseTile, stop: IntArray | None = None) -> ReleaseRows:
     """Compute a tile; what it returns depends on nothing but the task."""

@@ -56,20 +56,6 @@ class Stretch(TileTask):
     vectors: FloatArray
     state: FloatArray
 
-    def fits(self, rows: StretchRows) -> bool:
-        """Tell whether rows that were kept are of its size."""
-        values, n = (len(self.vectors),), self.state.shape
-        if rows.upto.shape != values:
-            return False
-        points = (int(rows.upto[-1]),)
-        whole = (rows.outcomes, rows.periods)
-        return (
-            all(a.shape == values and a.dtype == np.int64 for a in whole)
-            and all(a.shape == points for a in (rows.cycles, rows.modes, rows.times))
-            and rows.states.shape == (*points, *n)
-            and rows.last.shape == n
-        )
-
 
 def compute_stretch(task: Stretch, stop: IntArray | None = None) -> StretchRows:
     """Compute a stretch; what it returns depends on nothing but the task."""

@@ -14,9 +14,7 @@ from numpy.typing import ArrayLike
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
-from contfric.chaos.store import TileFolder, digest, open_tiles, versions
 from contfric.chaos.tiles import inside
-from contfric.chaos.work import kept_rows
 from contfric.errors import ParameterError, function_of, mapping_of, real_number, shown
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
@@ -24,6 +22,8 @@ from contfric.models.tied import tied
 from contfric.orbit.starts import checked_state
 from contfric.orbit.system import IntArray
 from contfric.orbit.time_scale import clock_period
+from contfric.remember.folder import kept_in
+from contfric.remember.journal import Parts
 from contfric.response.collecting import repeats_of
 from contfric.response.cuts import Cut, Following
 from contfric.response.outcome import Outcome
@@ -63,20 +63,6 @@ class _SweepJob:
         vectors = np.tile(self.vector, (len(numbers), 1))
         vectors[:, self.model.index_of(self.parameter)] = self.values[numbers]
         return Stretch(self.model, self.cut, self.how, vectors, state)
-
-    def record(self) -> dict[str, Any]:
-        """Describe the sweep, so that stretches of another one are not taken for its."""
-        return {
-            **versions(self.model),
-            "kind": "sweep",
-            "params": self.model.mapping(self.vector),
-            "parameter": self.parameter,
-            "values": digest(self.values),
-            "states": digest(*self.starts.values()),
-            "section": [*map(float, self.cut[2:]), digest(self.cut.joints, self.cut.inside)],
-            "limits": list(self.how),
-            "tile": STRETCH,
-        }
 
 
 def sweep(
@@ -129,7 +115,7 @@ def sweep(
     ParameterError
         If an argument is not valid, or the model is defined at none of the values.
     ResultFileError
-        If the folder holds parts of another computation, or cannot be written.
+        If the folder cannot be written, or another version of contfric has written to it.
 
     Examples
     --------
@@ -166,8 +152,8 @@ def sweep(
     job = _SweepJob(
         model, parameter, grid, vector, defined, _DIRECTIONS[direction], cut, how, starts
     )
-    kept = None if folder is None else open_tiles(folder, job.record())
-    runs = _computed(job, executor, kept, progress)
+    with kept_in(folder):
+        runs = _computed(job, executor, progress)
     return Sweep(model, parameter, grid, vector, section, runs)
 
 
@@ -211,39 +197,32 @@ def _defined(
 
 
 def _computed(
-    job: _SweepJob, executor: Executor | None, kept: TileFolder | None, progress: Progress | None
+    job: _SweepJob, executor: Executor | None, progress: Progress | None
 ) -> dict[str, SweepRun]:
-    parts = -(-len(job.defined) // STRETCH)
     done: dict[str, list[StretchRows]] = {name: [] for name in job.directions}
-    for place, name in enumerate(job.directions):
-        while kept is not None and len(done[name]) < parts:
-            number = len(done[name])
-            state = done[name][-1].last if done[name] else job.starts[name]
-            task = job.stretch(name, number, state)
-            assert task is not None
-            rows = kept_rows(StretchRows, kept.read(place * parts + number), task.fits)
-            if rows is None:
-                break
-            done[name].append(rows)
-    finished = sum(map(len, done.values()))
-    timer = Timer(parts * len(job.directions), finished, progress, "sweep")
+    tasks: dict[str, Stretch] = {}
+    kept = Parts("sweep")
 
     def following(name: str, rows: StretchRows) -> Stretch | None:
         return job.stretch(name, len(done[name]), rows.last)
 
-    tasks = {}
     for name in job.directions:
-        state = done[name][-1].last if done[name] else job.starts[name]
-        first = job.stretch(name, len(done[name]), state)
-        if first is not None:
-            tasks[name] = first
+        task = job.stretch(name, 0, job.starts[name])
+        while task is not None and (rows := kept.get(task)) is not None:
+            done[name].append(rows)
+            task = following(name, rows)
+        if task is not None:
+            tasks[name] = task
+    parts = -(-len(job.defined) // STRETCH)
+    finished = sum(map(len, done.values()))
+    timer = Timer(parts * len(job.directions), finished, progress, "sweep")
     try:
         if tasks:
             compiled(job.model)
         found = compute_all(tasks, executor, timer.say, compute_stretch, following=following)
         for name, rows in found:
-            if kept is not None:
-                kept.write(job.directions.index(name) * parts + len(done[name]), vars(rows))
+            state = done[name][-1].last if done[name] else job.starts[name]
+            kept.put(job.stretch(name, len(done[name]), state), rows)
             done[name].append(rows)
             timer.tick()
     except KeyboardInterrupt:

@@ -7,9 +7,8 @@ the program: the same command goes on from it, and replaces what an interrupted 
 from __future__ import annotations
 
 import json
-import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -18,12 +17,9 @@ from contfric.errors import ContfricError, ResultFileError
 from contfric.remember.journal import Journal, belongs, digest_of, keeping, program
 from contfric.remember.stored import UnstorableError, Writer
 from contfric.study.read import Study
-from contfric.study.tasks import TASKS
 
 #: The journal, in the folder of the run.
 CHECKPOINT = "checkpoint"
-#: Folders of finished parts of a task, inside that of the run, until its result is complete.
-ALL_TILES = tuple(f"{task.name}-tiles" for task in TASKS)
 #: Seconds after which a checkpoint in the user's cache is forgotten: a month.
 _FORGOTTEN = 30 * 86400
 
@@ -60,8 +56,6 @@ def check_unfinished(path: Path, key: str, force: bool) -> None:
             "start anew (--force, force=True)"
         )
     Journal(path / CHECKPOINT, key).remove()  # unless another process is writing to it
-    for name in ALL_TILES:
-        shutil.rmtree(path / name, ignore_errors=True)
 
 
 class Checkpoint:
@@ -71,8 +65,6 @@ class Checkpoint:
     ----------
     journal : Journal or None
         None where no file can be written: then nothing is kept.
-    tiles : sequence of Path
-        Folders of finished tiles, which go with it.
 
     Attributes
     ----------
@@ -80,8 +72,8 @@ class Checkpoint:
         Results of an interrupted computation that were found in it.
     """
 
-    def __init__(self, journal: Journal | None, tiles: Sequence[Path] = ()) -> None:
-        self._journal, self._tiles = journal, tiles
+    def __init__(self, journal: Journal | None) -> None:
+        self._journal = journal
         self.earlier = 0 if journal is None else len(journal)
 
     @contextmanager
@@ -101,13 +93,10 @@ class Checkpoint:
     def done(self) -> None:
         """Remove it: the computation has ended well."""
         self._end(remove=True)
-        for path in self._tiles:
-            shutil.rmtree(path, ignore_errors=True)
 
     def leave(self) -> bool:
         """Leave it for a computation that goes on, if anything is in it; whether that is so."""
-        tiles = any(path.exists() for path in self._tiles)
-        full = self._journal is not None and (tiles or len(self._journal) > 0)
+        full = self._journal is not None and len(self._journal) > 0
         self._end(remove=not full)
         return full
 
@@ -122,7 +111,7 @@ class Checkpoint:
 
 def checkpoint_in(folder: Path, key: str) -> Checkpoint:
     """Return the checkpoint of a run, in its folder."""
-    return Checkpoint(Journal(folder / CHECKPOINT, key), [folder / name for name in ALL_TILES])
+    return Checkpoint(Journal(folder / CHECKPOINT, key))
 
 
 def checkpoint_of(asked: tuple[object, ...]) -> Checkpoint:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -139,13 +138,11 @@ class _Run:
         for task in tasks:
             task.ahead()
         for task in tasks:
-            tiles = self.folder.path / f"{task.name}-tiles"
-            job = Job(self.study, self.found, tiles, self.say)
+            job = Job(self.study, self.found, self.say)
             found = self._timed(task.name, partial(task.compute, job))
             self.found[task.result] = found
             if task.cut_short(found):
                 raise KeyboardInterrupt
-            shutil.rmtree(tiles, ignore_errors=True)
 
     def _timed(self, name: str, step: Callable[[], _T]) -> _T:
         start = time.perf_counter()

@@ -219,8 +219,7 @@ def test_files_that_are_no_files(orbit: cf.Orbit, tmp_path: Path) -> None:
         refused(lambda read=read: read(tmp_path / "fifo.yaml"), ContfricError)
     tiles = tmp_path / "tiles"
     tiles.mkdir()
-    os.mkfifo(tiles / "map.json")
-    os.mkfifo(tiles / "tile-000000.npz")
+    os.mkfifo(tiles / "parts")
     refused(lambda: cf.lyapunov_map("coulomb", GRID, {"S0": 0.4}, folder=tiles), ResultFileError)
 
 
@@ -235,5 +234,5 @@ def test_folders_of_tiles_that_are_no_paths(folder: Any) -> None:
         lambda: cf.basins("coulomb", starts, START, folder=folder),
     ]
     for call in calls:
-        with pytest.raises(ResultFileError, match="the folder of finished tiles is a path"):
+        with pytest.raises(ResultFileError, match="the folder of finished parts is a path"):
             call()

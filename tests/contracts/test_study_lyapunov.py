@@ -51,7 +51,7 @@ def test_a_map_alone(write, tmp_path: Path) -> None:
     assert np.array_equal(result.lyapunov.exponents, direct.exponents, equal_nan=True)
     names = {file.name for file in result.files}
     assert names == {"lyapunov.csv", "lyapunov.npz", "lyapunov.png", "run.json"}
-    assert not (tmp_path / "out" / "lyapunov-tiles").exists()
+    assert not (tmp_path / "out" / "checkpoint").exists()
     loaded = cf.load(tmp_path / "out" / "lyapunov.npz")
     assert np.array_equal(loaded.exponents, direct.exponents, equal_nan=True)
     with (tmp_path / "out" / "lyapunov.csv").open(newline="") as file:
@@ -97,11 +97,10 @@ def test_a_killed_run_goes_on(write, tmp_path: Path) -> None:
     first = cf.run_study(path, out, progress=kill)
     assert first.status is RunStatus.INTERRUPTED
     assert first.lyapunov is not None and not first.lyapunov.complete
-    kept = list((out / "lyapunov-tiles").glob("tile-*.npz"))
-    assert kept
+    assert (out / "checkpoint").exists()
     said: list[str] = []
     second = cf.run_study(path, out, force=True, progress=said.append)
-    assert second.status is RunStatus.DONE and not (out / "lyapunov-tiles").exists()
+    assert second.status is RunStatus.DONE and not (out / "checkpoint").exists()
     assert any("in" in text and "already" in text for text in said)
     direct = cf.lyapunov_map("coulomb", second.lyapunov.axes, {"S0": 0.4}, periods=100)
     assert np.array_equal(second.lyapunov.exponents, direct.exponents, equal_nan=True)

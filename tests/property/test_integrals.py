@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -114,16 +115,20 @@ def test_operations_of_a_tape_have_their_derivatives(text: str) -> None:
     _agrees_with_differences(f"mean({text})")
 
 
+@cache
+def _orbit(Omega: float, S: float) -> cf.Orbit:
+    return cf.solve_orbit("coulomb", "1a", {"Omega": Omega, "S": S, "S0": 0.4})
+
+
 def _agrees_with_differences(quantity: str) -> None:
     """Compare with orbits that are solved on both sides, and see that compiled code measured them."""
-    params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
-    orbit = cf.solve_orbit("coulomb", "1a", params)
+    orbit, params, step = _orbit(0.5, 0.32), {"Omega": 0.5, "S": 0.32}, 1e-4
     (functional,) = quantity_of(quantity, orbit.model).parsed.functionals.values()  # type: ignore[union-attr]
     assert orbit.integrals(inside_of(orbit.model).tape(functional), 0.0, None) is not None
-    gradient, step = orbit.gradient(quantity), 1e-4
+    gradient = orbit.gradient(quantity)
     for name in ("Omega", "S"):
         ends = [
-            cf.solve_orbit("coulomb", "1a", {**params, name: params[name] + by}).quantity(quantity)
+            _orbit(**{**params, name: params[name] + by}).quantity(quantity)
             for by in (step, -step, 2 * step, -2 * step)
         ]
         slope = (8.0 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12.0 * step)

@@ -72,7 +72,6 @@ class BasinsTask(Response):
             self._axes(),
             study.params,
             self.at,
-            folder=job.tiles,
             progress=job.say,
             **self.options(),
         )

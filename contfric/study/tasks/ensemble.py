@@ -122,7 +122,7 @@ class EnsembleTask(Response):
         spawn = get_context("spawn")
         pool = ProcessPoolExecutor(workers, mp_context=spawn) if workers > 1 else None
         with pool or nullcontext():
-            return self.drawn(job.study, executor=pool, folder=job.tiles, progress=job.say)
+            return self.drawn(job.study, executor=pool, progress=job.say)
 
     def drawn(self, study: Study, **options: Any) -> Ensemble:
         """Compute it for a study, with options of :func:`contfric.ensemble` in place of the task's."""

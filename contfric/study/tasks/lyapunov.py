@@ -76,7 +76,6 @@ class LyapunovTask(Response):
             study.model,
             {name: values_of(ends) for name, ends in self.grid.items()},
             {name: value for name, value in study.params.items() if name not in self.grid},
-            folder=job.tiles,
             progress=job.told(self.name),
             **self.options(),
         )

@@ -44,7 +44,7 @@ class ReleaseMapTask(Response):
         """Follow every release; a killed run goes on from its tiles."""
         from contfric.response.release import release_map
 
-        given = {"folder": job.tiles, "progress": job.say, **self.options()}
+        given = {"progress": job.say, **self.options()}
         return release_map(job.study.model, job.study.params, **given)
 
     def entry(self, found: ReleaseMap) -> dict[str, Any]:

@@ -73,7 +73,6 @@ class SweepTask(SectionTask):
             self.parameter,
             values_of(self.values),
             others,
-            folder=job.tiles,
             progress=job.say,
             **self.options(),
         )

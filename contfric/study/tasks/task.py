@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
@@ -62,13 +61,11 @@ class Job:
     ----------
     study : the study that asks for it
     found : results of the tasks before it
-    tiles : a folder for finished parts, from which a killed run goes on
     say : takes a line of text now and then
     """
 
     study: Study
     found: Found
-    tiles: Path
     say: Say
 
     def told(self, name: str) -> Say:
