@@ -15,7 +15,7 @@ from contfric.models.definition import Domain, Reset, Surface
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
 from contfric.models.grammar import parse
-from contfric.models.parts import Lead, led
+from contfric.models.parts import EITHER, Lead, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24
@@ -119,6 +119,8 @@ class Landing:
                 told.pop()
             )  # the mode that is asked for may not hold at states that no solution brings
         one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
+        if own and len(told) > 1 and self.ways():
+            return EITHER
         if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
         if passed and any(verdicts[side] for side in (1, -1)):
@@ -133,8 +135,36 @@ class Landing:
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
-            "mode to which it leads ('to: mode', which lies on one side of that surface)",
+            f"mode to which it leads ('to: mode', which lies on one side of that surface){self._advice(surface)}",
         )
+
+    def _advice(self, surface: str) -> str:
+        """Return what to declare where a kick may pass its surface or turn back."""
+        if surface != self.surface:
+            return ""
+        return (
+            f". If it may pass '{surface}' or turn back, declare a surface where the rate of its observable "
+            "vanishes, such as stop: {observable: v}: its sides tell"
+        )
+
+    def ways(self) -> frozenset[str]:
+        """Return the domains in which motion leaves the surface; none if in one of them it may come back.
+
+        So the sides of all other surfaces tell whether what a kick sends against its motion passes still.
+        """
+        found = set()
+        for domain in self.domains:
+            side, others = domain.signs[self.surface], dict(domain.signs)
+            others.pop(self.surface)
+            rates = [
+                side * self.sampler.rate(domain.mode, self.surface, side, t, y)
+                for t, y in self.sampler.on(self.surface, others, _PLACES)
+            ]
+            if rates and min(rates) > 0.0:
+                found.add(domain.name)
+            elif rates and max(rates) > 0.0:
+                return frozenset()
+        return frozenset(found)
 
     def _is_label(self, surface: str, behind: Sequence[Domain]) -> bool:
         """Tell whether one mode is behind, on both sides of a surface: motion passes it there unchanged."""
@@ -202,4 +232,5 @@ def reset_of(
     formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
     wraps = any(surface in wraps_of(angle) for angle in description.angles)
     modes = description.acts.get(surface, ())
-    return Reset(surface, formula, changes, lands, leads, modes, wraps)
+    ways = landing.ways() if EITHER in lands.values() else frozenset()
+    return Reset(surface, formula, changes, lands, leads, modes, wraps, ways)
