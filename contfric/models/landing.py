@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from contfric.models.angles import wraps_of
 from contfric.models.definition import Domain, Reset, Surface
@@ -19,6 +20,8 @@ from contfric.models.parts import EITHER, Lead, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24
+#: How much farther than where motion is sought the speeds are that a kick does not turn back.
+_FAR = 16.0
 #: Rounding of an image on a surface, relative to 1 + its values.
 _ON = 1e-9
 
@@ -48,7 +51,7 @@ class Landing:
         leads: Sequence[Lead],
     ) -> None:
         self.sampler, self.surface, self.leads = sampler, surface, leads
-        self.surfaces = [s.name for s in surfaces]
+        self.known, self.surfaces = surfaces, [s.name for s in surfaces]
         self.domains = domains
         self.arrivals = list(self._arrivals())
 
@@ -114,13 +117,15 @@ class Landing:
         told = {side for side in verdicts if side}
         if len(told) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
             told = asked.keys() - {0}
+        if own and len(told) == 1 and self._may_be_slower(surface):
+            told |= {turn for turn in self._far(met) if turn}
         if len(told) == 1 and (self.leads or not verdicts[0]):
             return (
                 told.pop()
             )  # the mode that is asked for may not hold at states that no solution brings
-        one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
         if own and len(told) > 1 and self.ways():
             return EITHER
+        one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
         if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
         if passed and any(verdicts[side] for side in (1, -1)):
@@ -135,8 +140,34 @@ class Landing:
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
-            f"mode to which it leads ('to: mode', which lies on one side of that surface){self._advice(surface)}",
+            "mode to which it leads ('to: mode', which lies on one side of that surface)"
+            f"{self._advice(surface)}",
         )
+
+    def _may_be_slower(self, surface: str) -> bool:
+        """Tell whether sides of other surfaces say on which side of its own what is kicked goes on.
+
+        Where a reset names its modes only, these tell.
+        """
+        free = not self.leads or any(lead.where for lead in self.leads)
+        ways = self.ways() if free else frozenset()
+        return len({d.signs[surface] for d in self.domains if d.name in ways}) > 1
+
+    def _far(self, met: Sequence[str]) -> set[int]:
+        """Return the sides to which states far away are sent, +1 back: a kick is weak for what is fast."""
+        far = Landing(
+            replace(self.sampler, scale=_FAR),
+            self.surface,
+            self.known,
+            self.domains,
+            self.leads,
+        )
+        images = [(d, t, far._image(t, y)) for d, t, y in far.arrivals]
+        return {
+            d.signs[self.surface] * self._side(self._behind(d, met, t, y), self.surface, met, t, y)
+            for d, t, y in images
+            if far._is_on(self.surface, t, y)
+        }
 
     def _advice(self, surface: str) -> str:
         """Return what to declare where a kick may pass its surface or turn back."""
