@@ -20,6 +20,11 @@ from contfric.models.parts import EITHER, Lead, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24
+#: What to declare where a kick may pass its surface or turn back.
+_ADVICE = (
+    ". If it may pass '{}' or turn back, declare a surface where the rate of its observable vanishes, "
+    "such as stop: {{observable: v}}: its sides tell"
+)
 #: How much farther than where motion is sought the speeds are that a kick does not turn back.
 _FAR = 16.0
 #: Rounding of an image on a surface, relative to 1 + its values.
@@ -141,7 +146,7 @@ class Landing:
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
             "mode to which it leads ('to: mode', which lies on one side of that surface)"
-            f"{self._advice(surface)}",
+            f"{_ADVICE.format(surface) if own and len(told) > 1 else ''}",
         )
 
     def _may_be_slower(self, surface: str) -> bool:
@@ -168,15 +173,6 @@ class Landing:
             for d, t, y in images
             if far._is_on(self.surface, t, y)
         }
-
-    def _advice(self, surface: str) -> str:
-        """Return what to declare where a kick may pass its surface or turn back."""
-        if surface != self.surface:
-            return ""
-        return (
-            f". If it may pass '{surface}' or turn back, declare a surface where the rate of its observable "
-            "vanishes, such as stop: {observable: v}: its sides tell"
-        )
 
     def ways(self) -> frozenset[str]:
         """Return the domains in which motion leaves the surface; none if in one of them it may come back.
