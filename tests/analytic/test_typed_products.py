@@ -31,10 +31,8 @@ modes:
 symmetry: x -> -x, v -> -v, t -> t + T/2
 """
 LAWS = (
-    "F*cos(w*t) - c*v - x*(1 + g*sign(x*v))",
     "F*cos(w*t) - c*v - x*(1 + g*sign(power))",
-    "F*cos(w*t) - c*v - x - g*abs(x*v)/v",
-    "F*cos(w*t) - c*v - x*(1 + g*sign(x/v))",
+    pytest.param("F*cos(w*t) - c*v - x - g*abs(x*v)/v", marks=pytest.mark.slow),
 )
 
 
