@@ -12,13 +12,15 @@ interior   surface with the same field behind      T
 any        surface with a reset in the mode        GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      a reset chooses its mode by that side   SS: the map jumps (entry: the same)
+joint      what crosses there is mapped on its way GS: the map jumps
+           back
 joint      the state at a stop meets a surface     CS if it leaves the stick there (distance to
                                                    the limit grows outward), SS if it enters it;
                                                    CS where there is no rest that the surface ends, and GS
                                                    where one of the two is the zero of the other's rate;
                                                    as the interior where a section is touched
-entry      after a reset the state is on another  CS: another mode follows
-           surface
+entry      after a reset the state is on another  CS: another mode follows; GS where what just passes or
+           surface                                 turns back is mapped again
 lasting    slide between two holds                 GS: the first can be left no more
 any        of a state of one of many contacts      as the exit by which it begins: AS of a slip, GS of a
            that vanishes (:func:`beginning_of`)    stick
@@ -39,6 +41,7 @@ from contfric.continuation.touching import (
     rate_along,
     rest_at,
     resting_domain,
+    thrown_at,
     touched_at_joint,
 )
 from contfric.models.definition import Domain, FloatArray, Model
@@ -70,9 +73,11 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     if chosen_at(system, test):
         return Kind.SS
     if test.margin is Margin.ENTRY:
-        return Kind.CS
+        return Kind.GS if thrown_at(orbit, test) else Kind.CS
     if model.reset_at(mode, test.surface) is not None:
         return Kind.CS if is_corner(system, test, orbit) else Kind.GS
+    if test.margin is Margin.JOINT and thrown_at(orbit, test):
+        return Kind.GS
     if test.margin is Margin.JOINT and test.surface in model.section_surfaces:
         resting = resting_domain(system, test)
         if resting is None and inside_sign(model, mode, test.surface) == 0:

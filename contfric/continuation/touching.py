@@ -189,11 +189,19 @@ def thrown_at(orbit: Orbit, test: EventFunction) -> str:
     one along it (a neuron that fires begins at x = 0, whatever x was). What the reset does not map on the way
     there it may map on the way back (``from: [falls]``).
     """
+    if test.margin is Margin.ENTRY:
+        return _kicked_again(orbit, test)
     reset = orbit.model.reset_by_surface.get(test.surface)
-    if reset is None or reset.wraps or test.margin not in (Margin.INTERIOR, Margin.EXIT):
+    if reset is None or reset.wraps:
         return ""
     mode = orbit.itinerary[test.segment][0]
     acts = orbit.model.reset_at(mode, test.surface) is not None
+    if test.margin is Margin.JOINT:
+        touched = None if acts else touched_at_joint(test, orbit, rest_at(test, orbit))
+        if touched != test.surface:
+            return ""
+    elif test.margin not in (Margin.INTERIOR, Margin.EXIT):
+        return ""
     try:
         inside = test.margin is Margin.INTERIOR
         touch = touch_of(orbit, test.segment, test.surface) if inside else orbit.ends[test.segment]
@@ -210,6 +218,32 @@ def thrown_at(orbit: Orbit, test: EventFunction) -> str:
     image = orbit.flow.reset(test.surface, float(touch[0]), touch[1:])
     moved = np.max(np.abs(image - touch[1:]))
     return test.surface if moved > _PASSED * (1.0 + np.max(np.abs(touch[1:]))) else ""
+
+
+def _kicked_again(orbit: Orbit, test: EventFunction) -> str:
+    """Return the surface of a kick that just turns motion back, or just lets it pass; nothing if not so.
+
+    Motion that leaves the surface to the one side at once and motion that leaves it to the other one first
+    are the same but for a moment, unless the reset maps it when it comes back.
+    """
+    model, i = orbit.model, test.segment
+    mode, surface = orbit.itinerary[i - 1]
+    reset = model.reset_at(mode, surface)
+    if reset is None or not reset.ways:
+        return ""
+    t, y = float(orbit.begins[i, 0]), orbit.begins[i, 1:]
+    own = orbit.itinerary[i][0]
+    if abs(rate_along(orbit, own, surface, orbit.begins[i])) > _PASSED:
+        return ""
+    side = 1 if second_rate(orbit, own, surface, t, y) > 0.0 else -1
+    first = [model.domain_by_name[name] for name in sorted(reset.ways)]
+    for domain in (d for d in first if d.signs[surface] == -side):
+        turned = model.transitions.get((domain.name, test.surface))
+        if turned is not None and model.maps_at(model.domain_by_name[turned], surface):
+            image = orbit.flow.reset(surface, t, y)
+            moved = np.max(np.abs(image - y)) > _PASSED * (1.0 + np.max(np.abs(y)))
+            return surface if moved else ""
+    return ""
 
 
 def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Domain | None:

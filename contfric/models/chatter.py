@@ -97,7 +97,7 @@ def with_chatter(model: Model) -> Model | None:
     """Return a model with chatter at all of its walls for which that is derived, or None."""
     if not model.definition or model.composed or model.chatters:
         return None
-    walls = tuple(r.surface for r in model.resets if r.lands.get(r.surface, 0) != 0)
+    walls = tuple(r.surface for r in model.resets if r.lands.get(r.surface) in (1, -1))
     return _with_chatter_at(model.definition, walls)
 
 

@@ -153,11 +153,15 @@ def check_period(description: Description) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """Random states in the region where motion takes place, always the same for the same seed."""
+    """Random states in the region where motion takes place, always the same for the same seed.
+
+    ``scale`` makes the region larger, but for states whose range the model says.
+    """
 
     evaluator: Evaluator[float]
     params: Mapping[str, float]
     seed: int = 1
+    scale: float = 1.0
 
     @cached_property
     def region(self) -> list[tuple[float, float]]:
@@ -167,7 +171,9 @@ class Sampler:
         wide = [2.0 * w if 0.0 < w < math.inf else 2.0 for w in found]
         ranges = description.ranges or ((),) * len(wide)
         return [
-            (value(ends[0], self.params), value(ends[1], self.params)) if ends else (-w, w)
+            (value(ends[0], self.params), value(ends[1], self.params))
+            if ends
+            else (-w * self.scale, w * self.scale)
             for w, ends in zip(wide, ranges, strict=True)
         ]
 

@@ -67,6 +67,7 @@ def sliding_parts(
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
     slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
     # where nothing slides all pass, where surfaces cross, too
+    heights: dict[str, Any] = {}
     slides = any(sliding.somewhere for sliding in slidings)
     if slides and (crossing := _crossing(description, surfaces, pairs)):
         return crossing_parts(description, crossing, data)
@@ -77,7 +78,7 @@ def sliding_parts(
                 f"'{sliding.name}' is the name of the sliding mode on '{sliding.surface}'",
             )
         if sliding.somewhere:
-            _add(found, sliding)
+            _add(found, sliding, heights)
     return found
 
 
@@ -218,20 +219,44 @@ class _Sliding:
         return as_text(formula.xreplace(self.named))
 
 
-def _add(found: dict[str, Any], sliding: _Sliding) -> None:
-    """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode."""
+def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> None:
+    """Put a sliding mode into the parts of a model: its observables, the surfaces that end it, the mode.
+
+    Where two modes slide on one surface, a field on a side of it may end both: that is one surface. Were it
+    two, states would be sought between them, and the image of one under a symmetry could be either.
+
+    Parameters
+    ----------
+    heights : the surfaces of the modes before it, with the rate that vanishes there
+    """
     own, itinerary = sliding.name, as_identifier(sliding.name)
+    sides: dict[str, Any] = {**sliding.sides, sliding.surface: 0}
+    ends = ((f"{own}-", "-", sliding.rate_up), (f"{own}+", "+", sliding.rate_down))
+    new = []
+    for name, side, rate in ends:
+        same, sense = _known_end(heights, rate)
+        if not same:
+            new.append((name, rate))
+        sides[same or name] = side if sense > 0 else {"-": "+", "+": "-"}[side]
     up = f"{itinerary}_rate"
-    found["observables"][up] = sliding.text(sliding.rate_up)
-    found["surfaces"][f"{own}-"] = {"observable": up, "level": "0"}
-    if sliding.constant:
-        low = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
-    else:
-        below = f"{itinerary}_below"
-        found["observables"][below] = sliding.text(sliding.rate_down)
-        low = {"observable": below, "level": "0"}
-    found["surfaces"][f"{own}+"] = low
+    for name, rate in new:
+        if sliding.constant and name == f"{own}+" and up in found["observables"]:
+            entry = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
+        else:
+            entry = {"observable": up if name == f"{own}-" else f"{itinerary}_below", "level": "0"}
+            found["observables"][entry["observable"]] = sliding.text(rate)
+        found["surfaces"][name] = entry
+        heights[name] = rate
     found["modes"][own] = {
-        "in": {**sliding.sides, sliding.surface: 0, f"{own}-": "-", f"{own}+": "+"},
+        "in": sides,
         "field": dict(zip(sliding.states, map(sliding.text, sliding.field), strict=True)),
     }
+
+
+def _known_end(heights: Mapping[str, Any], rate: Any) -> tuple[str, int]:
+    """Return the surface where a rate vanishes, and whether its sides are the rate's own (1) or not (-1)."""
+    for name, height in heights.items():
+        for sense in (1, -1):
+            if sympy.expand(height - sense * rate) == 0:
+                return name, sense
+    return "", 1

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from contfric.errors import ModelError, did_you_mean
+from contfric.models.products import of_product
 
 T = TypeVar("T")
 
@@ -310,7 +311,10 @@ class Scope(Generic[T]):
 
     def _call(self, name: str, arguments: list[ast.expr]) -> T:
         if name == "where":
-            return self._choose(arguments[0], arguments[1], arguments[2])
+            yes, no = self.evaluate(arguments[1]), self.evaluate(arguments[2])
+            return self._branch(arguments[0], yes, no)
+        if name in ("abs", "sign"):
+            return of_product(self, self.algebra.functions[name], arguments[0])
         values: list[Any] = [self.evaluate(argument) for argument in arguments]
         if name in UNARY:
             return self.algebra.functions[name](values[0])
@@ -320,9 +324,6 @@ class Scope(Generic[T]):
             first, second = (found, value) if name == "min" else (value, found)
             found = self.algebra.where(larger, first, second)
         return found  # type: ignore[no-any-return]
-
-    def _choose(self, condition: ast.expr, yes: ast.expr, no: ast.expr) -> T:
-        return self._branch(condition, self.evaluate(yes), self.evaluate(no))
 
     def _branch(self, condition: ast.expr, yes: T, no: T) -> T:
         if isinstance(condition, ast.UnaryOp):

@@ -9,16 +9,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from contfric.models.angles import wraps_of
 from contfric.models.definition import Domain, Reset, Surface
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
 from contfric.models.grammar import parse
-from contfric.models.parts import Lead, led
+from contfric.models.parts import EITHER, Lead, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24
+#: What to declare where a kick may pass its surface or turn back.
+_ADVICE = (
+    ". If it may pass '{}' or turn back, declare a surface where the rate of its observable vanishes, "
+    "such as stop: {{observable: v}}: its sides tell"
+)
+#: How much farther than where motion is sought the speeds are that a kick does not turn back.
+_FAR = 16.0
 #: Rounding of an image on a surface, relative to 1 + its values.
 _ON = 1e-9
 
@@ -48,7 +56,7 @@ class Landing:
         leads: Sequence[Lead],
     ) -> None:
         self.sampler, self.surface, self.leads = sampler, surface, leads
-        self.surfaces = [s.name for s in surfaces]
+        self.known, self.surfaces = surfaces, [s.name for s in surfaces]
         self.domains = domains
         self.arrivals = list(self._arrivals())
 
@@ -114,10 +122,14 @@ class Landing:
         told = {side for side in verdicts if side}
         if len(told) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
             told = asked.keys() - {0}
+        if own and len(told) == 1 and self._may_be_slower(surface):
+            told |= {turn for turn in self._far(met) if turn}
         if len(told) == 1 and (self.leads or not verdicts[0]):
             return (
                 told.pop()
             )  # the mode that is asked for may not hold at states that no solution brings
+        if own and len(told) > 1 and self.ways():
+            return EITHER
         one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
         if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
@@ -133,8 +145,53 @@ class Landing:
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
-            "mode to which it leads ('to: mode', which lies on one side of that surface)",
+            "mode to which it leads ('to: mode', which lies on one side of that surface)"
+            f"{_ADVICE.format(surface) if own and len(told) > 1 else ''}",
         )
+
+    def _may_be_slower(self, surface: str) -> bool:
+        """Tell whether sides of other surfaces say on which side of its own what is kicked goes on.
+
+        Where a reset names its modes only, these tell.
+        """
+        free = not self.leads or any(lead.where for lead in self.leads)
+        ways = self.ways() if free else frozenset()
+        return len({d.signs[surface] for d in self.domains if d.name in ways}) > 1
+
+    def _far(self, met: Sequence[str]) -> set[int]:
+        """Return the sides to which states far away are sent, +1 back: a kick is weak for what is fast."""
+        far = Landing(
+            replace(self.sampler, scale=_FAR),
+            self.surface,
+            self.known,
+            self.domains,
+            self.leads,
+        )
+        images = [(d, t, far._image(t, y)) for d, t, y in far.arrivals]
+        return {
+            d.signs[self.surface] * self._side(self._behind(d, met, t, y), self.surface, met, t, y)
+            for d, t, y in images
+            if far._is_on(self.surface, t, y)
+        }
+
+    def ways(self) -> frozenset[str]:
+        """Return the domains in which motion leaves the surface; none if in one of them it may come back.
+
+        So the sides of all other surfaces tell whether what a kick sends against its motion passes still.
+        """
+        found = set()
+        for domain in self.domains:
+            side, others = domain.signs[self.surface], dict(domain.signs)
+            others.pop(self.surface)
+            rates = [
+                side * self.sampler.rate(domain.mode, self.surface, side, t, y)
+                for t, y in self.sampler.on(self.surface, others, _PLACES)
+            ]
+            if rates and min(rates) > 0.0:
+                found.add(domain.name)
+            elif rates and max(rates) > 0.0:
+                return frozenset()
+        return frozenset(found)
 
     def _is_label(self, surface: str, behind: Sequence[Domain]) -> bool:
         """Tell whether one mode is behind, on both sides of a surface: motion passes it there unchanged."""
@@ -202,4 +259,5 @@ def reset_of(
     formula = ", ".join(f"{state} -> {value}" for state, value in texts.items())
     wraps = any(surface in wraps_of(angle) for angle in description.angles)
     modes = description.acts.get(surface, ())
-    return Reset(surface, formula, changes, lands, leads, modes, wraps)
+    ways = landing.ways() if EITHER in lands.values() else frozenset()
+    return Reset(surface, formula, changes, lands, leads, modes, wraps, ways)

@@ -161,6 +161,10 @@ class Departure:
     leaves: Mapping[str, int]
 
 
+#: The side of a surface to which some images leave it, others to the other one: a kick against the motion.
+EITHER = 2
+
+
 @dataclass(frozen=True)
 class Reset:
     """A map of the state where it meets a surface, ``y+ = R(t, y; p)``: an impact, a switch, a firing.
@@ -175,7 +179,9 @@ class Reset:
     changes : observables whose values the map changes; the domains that can follow are those that differ in
         the signs of these
     lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
-        surface that is +1 where it goes back (a wall), -1 where it passes. 0 where it goes on sliding there
+        surface that is +1 where it goes back (a wall), -1 where it passes. 0 where it goes on sliding there,
+        :data:`EITHER` where the domain after it tells the side
+    ways : domains in which images leave the surfaces that they lie on; empty if their sides are known
     leads : the modes after the reset, the first that holds; else the mode before it where that holds, or
         another one
     modes : modes in which it acts; by default (empty) those that lie on one side of the surface
@@ -189,6 +195,12 @@ class Reset:
     leads: tuple[Lead, ...] = ()
     modes: tuple[str, ...] = ()
     wraps: bool = False
+    ways: frozenset[str] = frozenset()
+
+    @property
+    def sides(self) -> dict[str, int]:
+        """The sides to which all images leave the surfaces that they lie on."""
+        return {surface: side for surface, side in self.lands.items() if side != EITHER}
 
     @property
     def chooses_by(self) -> set[str]:

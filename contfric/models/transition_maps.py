@@ -215,21 +215,22 @@ class TransitionMaps(SectionMaps):
         """Return whether a reset may change the sign at a surface."""
         return self.surface_by_name[surface].observable in reset.changes
 
+    def _fixed_by(self, reset: Reset) -> list[str]:
+        """Return the surfaces whose sides a reset cannot change; it leads onto none of them."""
+        free = (s.name for s in self.surfaces if not self.changed_by(reset, s.name))
+        return [name for name in free if name not in reset.lands]
+
     def _domains_after(self, domain: Domain, reset: Reset) -> tuple[str, ...]:
         """Return the domains that a reset can map to: they differ in what it changes.
 
         Where several modes hold, the one that the reset names goes on, or else the mode before it.
         """
-        fixed = {
-            s.name: domain.signs[s.name]
-            for s in self.surfaces
-            if not self.changed_by(reset, s.name)
-        }
-        own = reset.lands.get(reset.surface, 1) * domain.signs[reset.surface]
-        landed = {**reset.lands, **({reset.surface: own} if reset.stays else {})}
-        asked = {**fixed, **landed}
+        asked = {name: domain.signs[name] for name in self._fixed_by(reset)} | reset.sides
+        if reset.surface in reset.sides:
+            asked[reset.surface] *= domain.signs[reset.surface]
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
+        behind = [d for d in behind if not reset.ways or d.name in reset.ways]
         behind = led(behind, reset.leads, domain.own_mode)
         if reset.stays and not reset.changes:  # it only says the mode
             labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
@@ -291,8 +292,7 @@ class TransitionMaps(SectionMaps):
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""
         if reset.surface not in self._landed_on:
             free = [s.name for s in self.surfaces if self.changed_by(reset, s.name)]
-            landed = {*reset.lands, *([reset.surface] if reset.stays else [])}
-            asked = sorted({s.name for s in self.surfaces if s.name not in free} | landed)
+            asked = sorted({*self._fixed_by(reset), *reset.sides})
             found: dict[tuple[int, ...], list[Domain]] = {}
             for domain in self.domains:
                 if all(domain.signs[name] != 0 for name in free if reset.lands.get(name) != 0):

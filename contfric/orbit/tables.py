@@ -121,7 +121,7 @@ def tables(model: Model) -> Tables:
         np.array([surfaces_under(model, m.name) for m in model.modes], dtype=np.int64),
         _by_mode(model, _surfaces_kept),
         _by_mode(model, lambda *met: bits_of(model, _landed(*met))),
-        bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface, 0) > 0)),
+        bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface) == 1)),
         chatter_table(model, len(model.modes)),
         flight_table(model, len(model.modes)),
     )

@@ -29,6 +29,7 @@ EXAMPLES = blocks(PAGE, "yaml")[1:]
 WORDS = {
     "neuron": {("rest", "threshold")},
     "clock": {("forth-", "middle"), ("forth+", "stop"), ("back", "stop")},
+    "recoil": {("back", "stop"), ("forth-", "gate")},
     "ball": {("flight", "table"), ("chatter", "table_lift")},
     "block": {
         *(("left", "upright"), ("right", "upright")),

@@ -142,30 +142,3 @@ def test_what_is_not_mapped_passes(tmp_path, seed: int) -> None:
     if ended != "turn":
         assert found.end is (SimulationEnd.IMPOSSIBLE if ended else SimulationEnd.TIME)
         assert len(found) == whole
-
-
-KICK = """
-name: kick
-states: [x, v]
-parameters: {{J: {J!r}, w: 1.3}}
-period: 2*pi/w
-surfaces: {{gate: {{observable: x}}, stop: {{observable: v}}}}
-field: {{x: v, v: cos(w*t) - x - 0.2*v}}
-modes: {{left: {{in: {{gate: -}}}}, right: {{in: {{gate: +}}}}}}
-resets: {{gate: {{v: {map}, from: [left]{to}}}}}
-spread: {{x: 2, v: 2}}
-"""
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("to", ["", ", to: {right: {stop: +}, left: {stop: -}}"])
-def test_a_kick_that_passes_or_turns_back_is_refused(tmp_path: Path, seed: int, to: str) -> None:
-    """The side of the gate after the kick depends on the speed: nothing may say one for all states."""
-    kick = float(np.random.default_rng(seed).uniform(0.3, 2.0))
-    for text in ("v - J", "v**2 - J", "J*(v - 1)"):
-        with pytest.raises(cf.ModelError, match="one side of it, some to the other"):
-            typed(tmp_path, KICK.format(J=kick, map=text, to=to))
-    for text, side in (("J*v", -1), ("-J*v", 1)):  # these all pass, or all turn back
-        assert typed(tmp_path, KICK.format(J=kick, map=text, to=to)).resets[0].lands == {
-            "gate": side
-        }
