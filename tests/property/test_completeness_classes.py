@@ -23,8 +23,10 @@ from contfric.continuation.arms import arms_at
 from contfric.continuation.continuum import is_continuum
 from contfric.continuation.doubling_point import _LOCATED, opening
 from contfric.continuation.moved_by_errors import duration_error
+from contfric.continuation.openings import with_openings
 from contfric.continuation.points import settings_of
 from contfric.continuation.report import ROUGH
+from contfric.orbit.index import opening_sign
 
 #: Scenes by what was wrong with them.
 CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
@@ -287,6 +289,38 @@ def test_a_hold_that_turns_back_at_once_is_told_from_none(share: float) -> None:
         limit, vertex = (float(b.params["zeta"]) for b in (bridge.ends[0].bifurcation, fold))
         nearer = (limit - solved.params["zeta"]) / (limit - vertex)
         assert abs(shorter - nearer) < 1e-3 and 0.6 < shorter < 0.9
+
+
+@pytest.mark.parametrize("unsigned", [1e-9, 3e-8])
+def test_where_a_hold_turns_by_itself_its_fold_is_no_doubling(
+    unsigned: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both determinants vanish at such a fold: that of a long chain has no sign from some distance on.
+
+    In scene 210 one of 75 segments had none from a tenth of a step on, and the secant failed: a doubling was
+    told there, 30 accuracies from the fold. Here the sign is taken away as near as that.
+    """
+
+    def sign(there: cf.Orbit) -> int | None:
+        return None if abs(opening(there)) < unsigned else opening_sign(there)
+
+    found = restarts.scene(42, 48)
+    orbit = cf.find_orbit("coulomb", {**found.params, "zeta": -0.025}, longest=1000)
+    explored = cf.explore(orbit, "zeta", (-0.0254, -0.0249), max_periods=4)
+    bridge = next(b for b in explored.branches if len(b.system.holds) == 1)
+    monkeypatch.setattr("contfric.continuation.openings.opening_sign", sign)
+    monkeypatch.setattr("contfric.continuation.openings.refined_opening", lambda *_: None)
+    passed = 0
+    for step in 0.01 * 10.0 ** np.random.default_rng(3).uniform(-1.0, 0.5, 6):
+        middle = bridge[len(bridge) // 2]
+        settings = settings_of(middle, "zeta", (-0.02522, -0.02517), float(step), False, 2)
+        branch = cf.continue_orbit(middle, "zeta", explored.range, max_step=float(step))
+        signs = [opening_sign(there) for there in branch]
+        passed += 1 in signs and -1 in signs
+        opened = with_openings(branch, replace(settings, copies=4))
+        kinds = [b.kind.value for b in opened.bifurcations if b.kind in ("SN", "BP", "PD")]
+        assert kinds == ["SN"], (step, kinds)
+    assert passed > 1
 
 
 def test_bridges_have_their_doublings_when_copies_are_raised() -> None:
