@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import chain
 
 import numpy as np
 
 from contfric.continuation.branch import Branch
+from contfric.continuation.moved_by_errors import duration_error
 from contfric.continuation.report import ROUGH
 from contfric.continuation.standing_slides import STANDS, goes_nowhere
 from contfric.models.definition import FloatArray
@@ -27,8 +29,8 @@ _NARROW = 1e-5
 #: A branch shorter than this (arclength) is asked whether it is admissible at all: beyond, the march notices.
 #: And what a margin misses by rounding, where states are known to its root.
 _SHORT, _ROUNDING = 1e-3, 1e-11
-#: Places on a branch, as shares of its points, that are asked whether its segments last: a segment that does
-#: not vanish all along lasts at one of them.
+#: Places on a branch, as shares of its points or of its length, that are asked whether its segments last: a
+#: segment that does not vanish all along lasts at one of them.
 _ASKED = (0.25, 0.5, 0.75)
 
 
@@ -45,16 +47,6 @@ def fault_of(branch: Branch, width: float) -> str | None:
     return found
 
 
-def _longest(branch: Branch, asked: Iterable[int]) -> FloatArray:
-    """Return the longest duration of each segment at some points of a branch, shape (segments,)."""
-    at = list(asked)
-    times = branch.joints[at, :, 0]
-    ends = times[:, :1] + branch.turns_at(at)[:, None]
-    lasts: FloatArray = np.diff(times, append=ends, axis=1)
-    found: FloatArray = lasts.max(axis=0)
-    return found
-
-
 def _only_touches(branch: Branch) -> bool:
     """Tell whether an itinerary has modes that no periodic motion is in (:mod:`contfric.orbit.one_way`)."""
     return fault_of_itinerary(branch[0]) is not None
@@ -64,13 +56,41 @@ def _never_held(branch: Branch) -> bool:
     """Tell whether a hold has no length at any point of a branch: the equations hold, and nothing is held.
 
     Where orbits are a continuum, those of them that touch rest solve the equations of a hold for every value
-    of the parameter. On a bridge a hold grows at least with the distance from its event.
+    of the parameter. On a bridge a hold grows at least with the distance from its event, unless it turns
+    back at once: then it is told from none by what rounding makes of it.
     """
     holds = [hold.segment for hold in branch.system.holds]
     if not holds:
         return False
-    lasts = _longest(branch, range(len(branch)))[holds]
-    return bool(np.any(lasts < _NO_TIME * min(1.0, branch.arc[-1])))
+    return any(_no_longer(branch, range(len(branch)), holds, _NO_TIME * min(1.0, branch.arc[-1])))
+
+
+def _no_longer(
+    branch: Branch, asked: Iterable[int], segments: Iterable[int], least: float
+) -> Iterator[bool]:
+    """Yield of each segment whether it is shorter than a number, and has no length as far as can be told.
+
+    The points of a short branch may all be near its ends: it is asked between them, too.
+    """
+    at = list(asked)
+    times = branch.joints[at, :, 0]
+    ends = times[:, :1] + branch.turns_at(at)[:, None]
+    lasts: FloatArray = np.diff(times, append=ends, axis=1)
+    for segment in segments:
+        k = int(np.argmax(lasts[:, segment]))
+        if lasts[k, segment] >= least:
+            yield False
+            continue
+        between = (branch.between(share * float(branch.arc[-1])) for share in _ASKED)
+        yield not any(
+            _lasts(orbit, branch.parameter, segment) for orbit in chain((branch[at[k]],), between)
+        )
+
+
+def _lasts(orbit: Orbit, parameter: str, segment: int) -> bool:
+    """Tell whether a segment lasts longer than the errors of all equations let it seem to."""
+    error = duration_error(orbit, orbit.model.index_of(parameter), segment)
+    return error is not None and bool(orbit.ends[segment, 0] - orbit.cycle[segment, 0] > error)
 
 
 def _never_lasts(branch: Branch) -> bool:
@@ -80,7 +100,8 @@ def _never_lasts(branch: Branch) -> bool:
     segment there, of no length. A segment that comes in at an event grows at least with the distance.
     """
     asked = {round(share * (len(branch) - 1)) for share in _ASKED}
-    return bool(np.any(_longest(branch, asked) < min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])))
+    least = min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])
+    return any(_no_longer(branch, asked, range(branch.system.segments), least))
 
 
 def _stands(branch: Branch) -> bool:

@@ -29,6 +29,11 @@ from contfric.orbit.orbit import Orbit
 #: parameter stands there (a share of the tangent below the second number), it and margins change by the
 #: square of the step, which may be rounding: then a longer one is tried.
 _NEAR_EVENT, _STANDS = (0.01, 0.1), 1e-9
+#: The same where these lead nowhere, or to an end at once: the branch may turn back before. In a tenth of it
+#: what comes in on it, which grows with the square of its length, could not be told from rounding.
+_TURNS_BACK = 1e-3
+#: Points of what consists of its ends.
+_ENDS = 2
 #: Cosines that miss 1 by less are those of one tangent: of an angle of 1e-4, which the corrector closes.
 _ONE_WAY = 1e-8
 #: Sine of the angle by which a curve may miss the direction it is looked for in.
@@ -63,6 +68,10 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
         # where the parameter stands a short side may have left in the wrong direction, by rounding
         if not stands or (longest is not None and longest[1].length > _SURELY_AWAY):
             break
+    if event.bifurcation.accuracy <= ACCURACY and (longest is None or longest[1].count == _ENDS):
+        found, _ = _longest_way(orbit, event, settings, _TURNS_BACK, state.progress)
+        if found is not None and (longest is None or found[1].length > 0.5 * longest[1].length):
+            longest = found
     if longest is None:
         return leave_singular(state, orbit, event, settings)
     there, side = longest

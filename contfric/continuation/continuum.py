@@ -80,8 +80,11 @@ def in_continuum(orbit: Orbit, active: int) -> bool:
 
 
 def is_continuum(branch: Branch) -> bool:
-    """Tell whether a branch is a family of orbits at one value of its parameter."""
-    values = branch.values
+    """Tell whether a branch is a family of orbits at one value of its parameter.
+
+    Its folds are asked, too: the points of a short bridge may all be near its ends, at one value.
+    """
+    _, values, _ = branch.nodes
     largest = float(np.max(np.abs(values)))
     return bool(branch.arc[-1] > _LENGTH and np.ptp(values) < _ONE_VALUE * (1.0 + largest))
 

@@ -1,4 +1,4 @@
-"""How far errors of all equations of a chain move the parameter at which an event is."""
+"""How far errors of all equations of a chain move what they fix: an event's parameter, a duration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from contfric.base.interrupts import held_back
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import linearised
+from contfric.orbit.linear import linearised, null_space
 from contfric.orbit.orbit import Orbit
 
 #: Units of rounding in one equation of a segment: its phases, its duration and its state have some each.
@@ -22,14 +22,46 @@ def moved_by_errors(orbit: Orbit, active: int, row: FloatArray, left: float) -> 
 
     ``row`` is the gradient of the condition, and ``left`` its error.
     """
+    wanted = np.zeros(orbit.joints.size + 1)
+    wanted[-1] = 1.0  # the parameter is the last unknown
+    found = _moved(orbit, active, row, wanted)
+    if found is None:
+        return None
+    moved, by_condition = found
+    own = np.finfo(float).eps * abs(float(orbit.vector[active]))
+    return moved + by_condition * left + own
+
+
+def duration_error(orbit: Orbit, active: int, segment: int) -> float | None:
+    """Return how far the same errors move the duration of a segment, on the curve of orbits through one.
+
+    None where that curve has no unique direction: the equations leave the duration free then.
+    """
+    vectors, shares = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    if len(vectors) != 1:
+        return None
+    count, m = orbit.joints.shape
+    wanted = np.zeros(count * m + 1)
+    wanted[segment * m] -= 1.0
+    wanted[(segment + 1) % count * m] += 1.0
+    found = _moved(orbit, active, np.append(vectors[0].ravel(), shares[0]), wanted)
+    return None if found is None else found[0]
+
+
+def _moved(
+    orbit: Orbit, active: int, row: FloatArray, wanted: FloatArray
+) -> tuple[float, float] | None:
+    """Return how far the errors of all equations move a sum of unknowns, and a unit of the condition's.
+
+    ``wanted`` has the shares of the unknowns in that sum, joints and parameter.
+    """
     a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
     b[-1] = b[-1] @ close
-    weights = _weights(a, b, c[:, :, active], row)
+    weights = _weights(a, b, c[:, :, active], row, wanted)
     if weights is None or not np.all(np.isfinite(weights)):
         return None
     errors = np.abs(residual) + _rounding(orbit)
-    own = np.finfo(float).eps * abs(float(orbit.vector[active]))
-    return float(np.abs(weights[:-1]) @ errors + abs(weights[-1]) * left + own)
+    return float(np.abs(weights[:-1]) @ errors), abs(float(weights[-1]))
 
 
 def _rounding(orbit: Orbit) -> FloatArray:
@@ -40,12 +72,12 @@ def _rounding(orbit: Orbit) -> FloatArray:
     return np.repeat(unit * size, orbit.joints.shape[1])
 
 
-def _weights(a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray) -> FloatArray | None:
-    """Return the last row of the inverse of the Jacobian of a chain with one parameter and one condition."""
+def _weights(
+    a: FloatArray, b: FloatArray, c: FloatArray, row: FloatArray, wanted: FloatArray
+) -> FloatArray | None:
+    """Return a sum of rows of the inverse of the Jacobian of a chain with one parameter and one condition."""
     count, m = c.shape
     size = count * m
-    wanted = np.zeros(size + 1)
-    wanted[size] = 1.0
     try:
         if size <= _FULL:
             full = np.zeros((size + 1, size + 1))

@@ -66,13 +66,16 @@ def _located(branch: Branch, k: int, before: int, settings: Settings) -> Bifurca
     there = refined or best
     if not abs(opening(there)) < _OPEN:
         return None
+    step = branch.arc[k + 1] - branch.arc[k]
+    around = branch.arc[k] + low * step, branch.arc[k] + high * step
+    if refined is None and _turns_within(branch, *around):
+        return None
     kind = Kind.BP if branch.system.half else Kind.PD
-    position = branch.arc[k] + low * (branch.arc[k + 1] - branch.arc[k])
     bound = (
         ACCURACY if refined is None else max(LEAST, location_error(there, active) / settings.width)
     )
     return Bifurcation(
-        *(kind, there.params, there, (), float(position), False, False),
+        *(kind, there.params, there, (), float(around[0]), False, False),
         bound=bound,
         parameter=branch.parameter,
     )
@@ -98,6 +101,14 @@ def _belongs_to_another(branch: Branch, event: Bifurcation, width: float) -> boo
         for b in branch.bifurcations
         if b.kind is not Kind.T
     )
+
+
+def _turns_within(branch: Branch, low: float, high: float) -> bool:
+    """Tell whether a fold lies where an opening was looked for until its sign was rounding.
+
+    Where one hold turns by itself both determinants vanish at the fold, which is known better.
+    """
+    return any(b.kind is Kind.SN and low <= b.position <= high for b in branch.bifurcations)
 
 
 def in_order(branch: Branch, found: list[Bifurcation]) -> tuple[Bifurcation, ...]:
