@@ -15,7 +15,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.matching import same_kind
+from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate
 from contfric.orbit.orbit import Orbit
@@ -47,7 +47,7 @@ def goes_on(state: Exploration, event: Event) -> bool:
     sums, sides = {-1: 0, 1: 0}, 0
     for number in event.branches:
         branch = state.branches[number]
-        for first in _ends_at(branch, event):
+        for first in _ends_at(branch, event, state.settings.width):
             index, side = _beside(branch, first, state.settings.parameter)
             if index is None:
                 return False
@@ -56,14 +56,15 @@ def goes_on(state: Exploration, event: Event) -> bool:
     return sides > 1 and sums[-1] == sums[1]
 
 
-def _ends_at(branch: Branch, event: Event) -> Iterator[int]:
-    """Yield the point (0 or -1) at which a branch ends at an event."""
+def _ends_at(branch: Branch, event: Event, width: float) -> Iterator[int]:
+    """Yield the point (0 or -1) at which a branch ends at an event; a short one has another end nearby."""
     for point, end in zip((0, -1), branch.ends, strict=True):
         own = end.bifurcation
-        if own is not None and same_kind(own, event.bifurcation):
-            gap = own.outline.apart(event.bifurcation.outline)
-            if any(own is member for member in event.members) or gap < 1e-5:
-                yield point
+        if own is None:
+            continue
+        same = any(own is member for member in event.members)
+        if same or same_event(own, event.bifurcation, branch.parameter, width):
+            yield point
 
 
 def _beside(branch: Branch, end: int, parameter: str) -> tuple[int | None, int]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
+from contfric.atlas.matching import inner_orbit
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
 from contfric.continuation.crossing_ends import starts_along
@@ -63,7 +64,7 @@ def _follow_through(
         known = state.known(there)
         branch = None if known is not None else whole_branch(there, settings)
         if branch is not None:
-            known = state.known(branch[len(branch) // 2])
+            known = state.known(inner_orbit(branch))
         if known is not None or branch is None:
             state.judge(event, reason, Decision.KNOWN, known)
         else:

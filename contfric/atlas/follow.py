@@ -27,7 +27,7 @@ from contfric.atlas.leaving_event import (
     may_have_passed,
     settings_for,
 )
-from contfric.atlas.matching import SAME_SOLUTION, on_branch, same_kind
+from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
 from contfric.atlas.short_branches import follow_short
 from contfric.atlas.splitting import follow_split
 from contfric.continuation.branch import Branch
@@ -119,6 +119,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
                 return
             if composes(orbit) and goes_on(state, event):
                 state.judge(event, "other orders of the changes", Decision.REFUSED, why=GOES_ON)
+                accepted = True  # or known: nothing else is looked for
                 break
             if event.proposals and event.proposals[-1].verdict is not Decision.REFUSED:
                 itineraries |= candidate.itineraries
@@ -167,7 +168,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
-        if (known := state.known(branch[len(branch) // 2])) is not None:
+        if (known := state.known(inner_orbit(branch))) is not None:
             state.judge(event, reason, Decision.KNOWN, known)
         else:
             state.accept(event, reason, branch)
@@ -242,7 +243,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         branch = _through(state, candidate.orbit)
         if branch is not None and branch.arc[-1] < _NOWHERE_ROUGHLY:
             branch = None
-        known = None if branch is None else state.known(branch[len(branch) // 2])
+        known = None if branch is None else state.known(inner_orbit(branch))
         if known is not None:
             state.judge(event, candidate.reason, Decision.KNOWN, known)
             return True
@@ -258,7 +259,7 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         why = "it begins and ends at the event, without any width"
         state.judge(event, candidate.reason, Decision.REFUSED, why=why)
         return False
-    if branch is not None and (found := state.known(branch[len(branch) // 2])) is not None:
+    if branch is not None and (found := state.known(inner_orbit(branch))) is not None:
         if any(ends_at(end, event, state.settings) for end in state.branches[found].ends):
             state.judge(event, candidate.reason, Decision.KNOWN, found)
             return True
@@ -350,7 +351,7 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
     branch = _through(state, orbit)
     if branch is None:
         state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
-    elif (known := state.known(branch[len(branch) // 2])) is not None:
+    elif (known := state.known(inner_orbit(branch))) is not None:
         state.judge(event, reason, Decision.KNOWN, known)
     else:
         state.accept(event, reason, branch)

@@ -169,6 +169,11 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
     return False
 
 
+def inner_orbit(branch: Branch) -> Orbit:
+    """Return the orbit of a branch nearest to the middle of its arclength: points crowd at a singular end."""
+    return branch[int(np.argmin(np.abs(branch.arc - 0.5 * (branch.arc[0] + branch.arc[-1]))))]
+
+
 def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
     """Yield guesses for the orbits of a branch at a value, and their locations, one each time it takes it.
 

@@ -41,6 +41,8 @@ from contfric.orbit.orbit import Orbit
 #: Where the bend of a branch is told from, and at which share of that it must be the same: up to this share
 #: of itself.
 _BEND, _NEARER, _MISSED = LEAVE, 0.25, 0.2
+#: Data that an orbit keeps (where contacts rest that never slip) and that differ by more are different ones.
+_KEPT = 1e-11
 #: How near a bridge begins that may begin there, in such distances.
 _AT_ONCE = 0.1
 
@@ -242,7 +244,9 @@ def short_branch_to(orbit: Orbit, settings: Settings, event: Event) -> Branch | 
         return None
     if orbit.system.half:
         vertex, reason = solved_at_vertex(orbit, active), EndReason.BP
-    elif symmetrised(orbit, near) is not None:
+    elif (part := symmetrised(orbit, near)) is not None:
+        if not _keeps(orbit, part):
+            return None
         vertex, reason = symmetric_part(orbit, active), EndReason.BP
     elif undoubled(orbit, near) is not None:
         vertex, reason = undoubled_part(orbit, active), EndReason.PD
@@ -255,6 +259,18 @@ def short_branch_to(orbit: Orbit, settings: Settings, event: Event) -> Branch | 
     phi = null_vector(whole)
     branches = (short_branch(whole, settings, start, reason, way) for way in (phi, -phi))
     return next((b for b in branches if b is not None and _meets(b, event, settings)), None)
+
+
+def _keeps(orbit: Orbit, part: Orbit) -> bool:
+    """Tell whether the symmetric part of an orbit keeps what the orbit does: then its branch may leave there.
+
+    Contacts that never slip rest at any place, and a branch is followed with that given: only where they rest
+    at the centre is a symmetric orbit on it.
+    """
+    data = orbit.system.layout.conserved
+    moved = orbit.joints[0, 1:] - part.joints[0, 1:]
+    size = 1.0 + float(np.max(np.abs(orbit.joints)))
+    return not len(data) or bool(np.max(np.abs(data @ moved)) < _KEPT * size)
 
 
 def _as_event(vertex: Orbit, settings: Settings, kind: Kind) -> Event | None:

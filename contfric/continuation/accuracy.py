@@ -27,6 +27,7 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.zero_acceleration import joint_within, stationary_values
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import time_unit
 from contfric.orbit.solve import refine
 from contfric.orbit.system import EventFunction, Margin
 
@@ -50,6 +51,11 @@ _CRITICAL = frozenset({Kind.SN, Kind.BP, Kind.PD})
 _ON_CIRCLE, _OF_CHANGE = 1e-6, 1e-4
 #: Rounding of the largest multiplier that hides all others: they are those of one product.
 _EPS, _HIDDEN = float(np.finfo(float).eps), 0.1
+#: A segment this short has no length; and how well lengths are known where several vanish together, in cube
+#: roots of rounding: what such a slide ends by is of the third order in its length.
+_NO_LENGTH, _LENGTHS = 1e-4, 10.0
+#: How far the parameter may be from the parabola that it is along the branch to such an event.
+_OFF_PARABOLA = 2.0
 #: An event whose equations are singular together is located to the root of rounding at best.
 _SINGULAR = 1e-6
 
@@ -104,10 +110,35 @@ class Estimate:
         """Return the error, and what is claimed if there is none."""
         kind, here, active = self.kind, self.here, self.here.model.index_of(self.parameter)
         if self.tests:
-            return self._of_margins(active), _SINGULAR
+            return self._at_most(self._of_margins(active)), _SINGULAR
         if kind is Kind.SN:
             return fold_error(here, active, self.sides, self.point), _SINGULAR
         return _multiplier_error(kind, here, active, self.width), ACCURACY
+
+    def _at_most(self, error: float | None) -> float | None:
+        """Return an error, or a smaller one that the branch tells where slides have no length any more.
+
+        Where a load just exceeds its limit a slip lasts as the root of what it exceeds it by. So along the
+        branch the parameter is a parabola, ``c d^2`` at a distance d before the event, and lengths go with d.
+        What a slip ends by is of third order in its length. A point nearer than the cube root of rounding is
+        rounding, and each of several slips has another length there; derivatives divide by their squares, and
+        say nothing of the parameter, which is off by ``c d^2`` with the d that is not known.
+        """
+        rough = 2.0 * ACCURACY * self.width
+        before, here = self.sides[0], self.here
+        lasts = here.ends[:, 0] - here.cycle[:, 0]
+        length, change = self.point.arc - before.arc, self.point.value - before.value
+        none = int(np.sum(lasts < _NO_LENGTH * time_unit(here)))
+        if error is None or error < rough or none < 2 or not length > 0.0 or change == 0.0:
+            return error
+        unknown = _LENGTHS * float(np.cbrt(here.model.rounding))
+        if length < unknown:  # the point before is no better known
+            own = abs(change) + unknown**2 * (1.0 + abs(self.point.value))
+            return min(error, max(rough, own))
+        bends = before.slope * length / (2.0 * change)
+        if not 1.0 / _OFF_PARABOLA < bends < _OFF_PARABOLA:
+            return error
+        return min(error, max(rough, abs(change) * (unknown / length) ** 2))
 
     def _of_margins(self, active: int) -> float | None:
         """Return the least error that one of the margins tells, the first that is good enough.

@@ -98,15 +98,17 @@ def slip_at_touch(orbit: Orbit, i: int, surface: str, departs: str, touch: Float
     Raises
     ------
     NotationError
-        If the rest begins at the touch, after such a slip.
+        If the rest begins at the touch, after such a slip, or ends at it, before one.
     """
-    mode = orbit.itinerary[i][0]
-    began = touch[0] - orbit.begins[i, 0] < _TOUCHES * time_unit(orbit)
-    if began and orbit.itinerary[i - 1][0] == departs and only_touches(orbit, i - 1):
-        raise NotationError(f"the slip before stick {i + 1} is at this touch of {surface}")
-    slip = departs, left_surface(orbit.model, mode, departs)
+    mode, after = orbit.itinerary[i][0], (i + 1) % len(orbit.itinerary)
+    short = _TOUCHES * time_unit(orbit)
+    began, ended = touch[0] - orbit.begins[i, 0] < short, orbit.ends[i, 0] - touch[0] < short
+    for near, slip, side in ((began, i - 1, "before"), (ended, after, "after")):
+        if near and orbit.itinerary[slip][0] == departs and only_touches(orbit, slip):
+            raise NotationError(f"the slip {side} stick {i + 1} is at this touch of {surface}")
+    inside = departs, left_surface(orbit.model, mode, departs)
     reason = f"slip at the touch of {surface} in stick {i + 1}"
-    return _opening(orbit, i, (surface, touch), slip, _SLIPS, reason)
+    return _opening(orbit, i, (surface, touch), inside, _SLIPS, reason)
 
 
 def stick_at_touch(orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray) -> Opening:

@@ -42,6 +42,9 @@ _NEARLY = 1e-2
 _INSIDE = (1e-2, -1e-2, 1e-3, -1e-3, 1e-4, -1e-4, 1e-5, -1e-5)
 #: Steps of Newton's method at one value, and trials of the value.
 _STEPS, _TRIALS = 8, 12
+#: A correction of Newton's method that is larger than the one before, and than this, says that it does not
+#: converge: next to a solution each is the square of the one before, down to rounding times the condition.
+_STALLS = 1e-6
 #: How far, in second smallest singular values, the reduced equations are solved for: Newton's method
 #: converges to a distance of that value over the second derivative (Kantorovich), of order one or less.
 _REACH = 10.0
@@ -237,15 +240,22 @@ def _null_vectors(by_joints: FloatArray, border: Border) -> Border:
 
 
 def _reduced(orbit: Orbit, vector: FloatArray, border: Border) -> FloatArray | None:
-    """Return the joints at which all equations hold but one, the part of F along w (Lyapunov, Schmidt)."""
-    joints = orbit.joints
+    """Return the joints at which all equations hold but one, the part of F along w (Lyapunov, Schmidt).
+
+    None where Newton's method goes away: along no family, as at an event known so roughly that any orbit may
+    seem to be next to one. (Its iterates may have segments of a thousand periods, which cost as much.)
+    """
+    joints, before = orbit.joints, np.inf
     for _ in range(_STEPS):
         residual, by_joints, _ = equations_at(orbit.system, joints, vector, False)
         full = _bordered(by_joints, border)
         if not (np.all(np.isfinite(full)) and np.all(np.isfinite(residual))):
             return None
         change = np.linalg.solve(full, np.append(-residual, 0.0))[:-1]
-        joints = joints + change.reshape(joints.shape)
-        if np.max(np.abs(change)) < np.finfo(float).eps:
+        size = float(np.max(np.abs(change)))
+        if size > max(before, _STALLS):
+            return None
+        joints, before = joints + change.reshape(joints.shape), size
+        if size < np.finfo(float).eps:
             break
     return joints

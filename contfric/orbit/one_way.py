@@ -5,6 +5,9 @@ whose one side all of these lie, and zero along all others, grows whenever a mot
 the same after a period, so that they last for no time: what solves the equations of such an itinerary are the
 orbits of the itinerary without these modes that just touch their limit, for every value of the parameter.
 
+What all of an itinerary conserves grows nowhere along it: where that is all that the other modes conserve,
+as it is of contacts that never slip, no height is asked.
+
 Other modes on that side may conserve it: where several sliders are in parallel all stop at once, at one
 surface, and only the strongest of them slips to one side only.
 """
@@ -41,12 +44,16 @@ def only_grows(model: Model, itinerary: Itinerary) -> tuple[str, ...]:
     """
     if not model.definition:
         return ()
+    throughout = conserved(model, itinerary)
     for surface, modes in _one_sided(model, itinerary):
         others = tuple(pair for pair in itinerary if pair[0] not in modes)
         mapped = [model.reset_at(*joint) for joint in itinerary if joint[0] in modes]
         if not others or any(mapped):
             continue
-        growing = _growing(model, conserved(model, others), surface, modes)
+        still = conserved(model, others)
+        if np.all(np.abs(still - still @ throughout.T @ throughout) < _ZERO):
+            continue
+        growing = _growing(model, still, surface, modes)
         if growing:
             return growing
     return ()

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from enum import Enum
 from functools import cache
+from itertools import islice
 
 import numpy as np
 
@@ -32,6 +33,9 @@ from contfric.signature.holds import is_hold
 _SAME = 1e-9
 #: States at which fields are compared, beyond the number of states, and at how many sets of parameters.
 _MORE, _SETS = 4, 2
+#: States at which the direction is asked for where it is known to be one: it is taken where the change is
+#: largest, and vanishes at all of these by no accident.
+_FEW = 4
 #: What the second set is changed by: what vanishes at the defaults alone is an accident.
 _MOVED = 1.07
 #: Distance from a surface that counts as on it.
@@ -113,7 +117,8 @@ def _is_small(slope: FloatArray, field: FloatArray) -> bool:
 
 def _projection(view: FlowView, slope: FloatArray, joint: tuple[str, str, str]) -> FloatArray:
     """Return the map of disturbances where sliding begins; e is that of the state at which it is largest."""
-    changes = [there - here for here, there in _fields(view, *joint)]
+    pairs = islice(_fields(view, *joint), _FEW)
+    changes = [there - here for here, there in pairs]
     along = max(changes, key=lambda change: float(np.linalg.norm(change)))
     return np.eye(len(slope)) - np.outer(along, slope) / (slope @ along)
 
@@ -158,7 +163,7 @@ def _lies_on(model: Model, mode: str) -> set[str]:
 def _fields(
     view: FlowView, mode: str, surface: str, following: str
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield the fields of two modes at random states on the surface between them."""
+    """Yield the fields of two modes at random states on the surface between them, as many as tell a rank."""
     model = view.model
     surfaces = sorted({surface} | _lies_on(model, mode) | _lies_on(model, following))
     draw = np.random.default_rng(1)

@@ -215,8 +215,16 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
     Raises
     ------
     ParameterError
-        If it is no state of the model, or none is given and none is found.
+        If it is no state of the model, or none is given and none is found; and where the period of the
+        excitation is none.
     """
+    period = model.view(vector).period
+    if not (model.autonomous or 0.0 < period < np.inf):
+        values = ", ".join(f"{name} = {value:g}" for name, value in model.mapping(vector).items())
+        raise ParameterError(
+            f"the period of the excitation of '{model.name}' is {period:g} at {values}: it has to be above 0 "
+            "and finite; a line of 'constraints' keeps parameters from such values"
+        )
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
         return displaced(model, vector)

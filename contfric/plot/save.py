@@ -179,8 +179,19 @@ def _save_pixels(fig: Figure, file: Path) -> Path:
 
 
 def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axes:
-    """Return the axes given, or those of a new pyplot figure."""
+    """Return the axes given, or those of a new pyplot figure.
+
+    Raises
+    ------
+    ParameterError
+        If something else is given, such as the quantity to be drawn.
+    """
     if ax is not None:
+        if not hasattr(ax, "set_xlim"):
+            raise ParameterError(
+                f"ax is one pair of axes of matplotlib, got {ax!r}: give what is drawn by its keyword, such "
+                "as row='x_max', and of several axes one"
+            )
         return ax
     with held_back():
         from matplotlib import pyplot
@@ -190,8 +201,10 @@ def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axe
 
 
 def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
-    """Return the figure given, or a new one of pyplot."""
+    """Return the figure given, or a new one of pyplot; ParameterError if it is none."""
     if fig is not None:
+        if not hasattr(fig, "add_subplot"):
+            raise ParameterError(f"fig is a figure of matplotlib, got {fig!r}")
         return fig
     with held_back():
         from matplotlib import pyplot
