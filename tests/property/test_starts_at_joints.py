@@ -111,7 +111,7 @@ def test_of_bundled_models(name: str) -> None:
     check_starts(cf.find_orbit(name))
 
 
-@pytest.mark.parametrize("name", ["blade-damper", "coulomb", "jenkins", "two-blocks"])
+@pytest.mark.parametrize("name", ["blade-damper", "coulomb", "jenkins"])
 def test_of_sections(name: str) -> None:
     """Compiled starts, as those of sweeps, maps and basins, go on as simulations do."""
     orbit = cf.find_orbit(name)
