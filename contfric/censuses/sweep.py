@@ -208,7 +208,9 @@ def sweep(  # type: ignore[no-untyped-def]
     count, n = starts.shape
     surfaces = tables.observables.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    state_workspace = StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n))
+    state_workspace = StateWorkspace(
+        none, empty, nothing, np.empty(n), np.empty(n), np.empty(1 + n)
+    )
     workspace = section_workspace(tables.lies_on[mode], exit_, surfaces, n)
     y, carry = np.empty(n), np.zeros(CARRIED)
     budget = _MOST_MET * (1 + joints.shape[1])

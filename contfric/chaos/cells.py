@@ -22,7 +22,17 @@ from contfric.chaos.rows import CellRows, FollowingLimits, Starting
 from contfric.chaos.starting import start_mode
 from contfric.chaos.tangent import ARRIVED, MODEL, any_time, forget_events, seed, set_model
 from contfric.chaos.workspaces import new_cell_workspaces, place, words_for
-from contfric.compiled import allocating_helper, f8, helper, i8, indices, kernel, matrix, vector
+from contfric.compiled import (
+    allocating_helper,
+    f8,
+    helper,
+    i8,
+    indices,
+    kernel,
+    matrix,
+    table,
+    vector,
+)
 from contfric.compiling.references import by_reference, reference_at, store_at
 from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
@@ -32,7 +42,9 @@ from contfric.orbit.system import IntArray
 from contfric.orbit.trajectory import HOLD_PERIODS, TablesType
 from contfric.orbit.walls import walls_of
 
-StartingType = types.NamedTuple([indices, indices, indices], Starting)
+StartingType = types.NamedTuple(
+    [indices, indices, indices, indices, indices, table, indices, indices, vector, f8], Starting
+)
 LimitsType = types.NamedTuple([i8, i8, f8, i8], FollowingLimits)
 CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], CellRows)
 

@@ -14,7 +14,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import tables
-from contfric.orbit.time_scale import ticks_of
+from contfric.orbit.time_scale import clock_period, ticks_of, time_scale
 
 
 class Starting(NamedTuple):
@@ -26,11 +26,25 @@ class Starting(NamedTuple):
         bits; by the signs of (observable - level), shape (3 ** surfaces,), surface k counting 3 ** k
         for zero and twice that for plus
     ranks : directions that survive a mode, shape (modes,)
+    first : domain that the signs say, as a row of ``sides``, -1 if none, shape (3 ** surfaces,)
+    own, sides : mode of each domain but chatter, shape (domains,), and its sides of all surfaces, shape
+        (domains, surfaces); those first that lie on most
+    settled : side of surfaces that a state is always on one side of, 0 of others, shape (surfaces,)
+    cuts : whether motion is cut at a surface in all modes, shape (surfaces,)
+    widths, unit : what the sizes of states and the unit of time are told by, as in
+        :mod:`contfric.orbit.entered`, at the default parameters; shape (n,), and a number
     """
 
     mode: IntArray
     on: IntArray
     ranks: IntArray
+    first: IntArray
+    own: IntArray
+    sides: IntArray
+    settled: IntArray
+    cuts: IntArray
+    widths: FloatArray
+    unit: float
 
 
 class FollowingLimits(NamedTuple):
@@ -79,18 +93,41 @@ def starting(model: Model) -> Starting:
     bounds = cut_bounds(model)
     mode = np.full(3 ** len(surfaces), -1, dtype=np.int64)
     on = np.zeros(3 ** len(surfaces), dtype=np.int64)
+    first = np.full(3 ** len(surfaces), -1, dtype=np.int64)
+    domains = [d for d in model.domains if d.own_mode not in model.chatter_by_mode]
+    domains.sort(key=lambda d: -sum(side == 0 for side in d.signs.values()))
+    rows = {d.name: row for row, d in enumerate(domains)}
     for signs in product((-1, 0, 1), repeat=len(surfaces)):
         code = sum((sign + 1) * 3**k for k, sign in enumerate(signs))
         named = dict(zip(surfaces, signs, strict=True))
         domain = model.domain_at({**named, **model.settled_sides})
         if domain is None:
             continue
+        first[code] = rows.get(domain, -1)
         name = model.domain_by_name[domain].own_mode
         mode[code] = model.mode_index[name]
         on[code] = sum(1 << model.surface_index[k] for k in bounds[name] if named[k] == 0)
     # a shift in time is no disturbance of an autonomous motion
     ranks = [m.rank - int(model.autonomous) for m in model.modes]
-    return Starting(mode, on, np.array(ranks, dtype=np.int64))
+    own = [model.mode_index[d.own_mode] for d in domains]
+    sides = [[d.signs[k] for k in surfaces] for d in domains]
+    settled, cuts = (
+        np.array(list(map(of, surfaces)), dtype=np.int64)
+        for of in (lambda k: model.settled_sides.get(k, 0), model.cuts)
+    )
+    defaults = model.vector({})
+    return Starting(
+        mode,
+        on,
+        np.array(ranks, dtype=np.int64),
+        first,
+        np.array(own, dtype=np.int64),
+        np.array(sides, dtype=np.int64).reshape(len(own), len(surfaces)),
+        settled,
+        cuts,
+        np.abs(np.asarray(model.spread(model.mapping(defaults)), dtype=np.float64)),
+        max(clock_period(model, defaults), time_scale(model)),
+    )
 
 
 def follow(

@@ -50,7 +50,12 @@ def new_cell_workspaces(width, n):  # type: ignore[no-untyped-def]
             np.full(width, SINGLY),
         ),
         StateWorkspace(
-            state.none, state.empty, state.nothing, as_many(width, state.after), state.trial
+            state.none,
+            state.empty,
+            state.nothing,
+            as_many(width, state.after),
+            state.trial,
+            state.slopes,
         ),
         np.empty((width, n, n + 1)),
         np.empty(n),
@@ -95,7 +100,9 @@ def place(space, k):  # type: ignore[no-untyped-def]
             transit.ahead[k : k + 1],
             transit.meets[k : k + 1],
         ),
-        StateWorkspace(state.none, state.empty, state.nothing, state.after[k], state.trial),
+        StateWorkspace(
+            state.none, state.empty, state.nothing, state.after[k], state.trial, state.slopes
+        ),
         space.frame[k],
         space.growth,
         Memory(

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from contfric.errors import AperiodicError, ConvergenceError
+from contfric.errors import AperiodicError, ConvergenceError, ParameterError
 from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
@@ -122,10 +122,13 @@ def _parting(trajectory: Trajectory) -> str:
         passed = float(trajectory.last[1]) - trajectory.begin[0]
         compared = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
     length = compared / clock_period(model, model.vector(trajectory.params))
-    one, other = (
-        simulate(model, trajectory.params, state=begin, time=time, periods=length)
-        for begin in (state, state + shift)
-    )
+    try:
+        one, other = (
+            simulate(model, trajectory.params, state=begin, time=time, periods=length)
+            for begin in (state, state + shift)
+        )
+    except ParameterError:  # no state of the model: an element beyond its limit
+        return ""
     if {one.end, other.end} != {SimulationEnd.TIME}:
         return ""
     apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))

@@ -38,3 +38,30 @@ def mode_after(tables, mode, surface, code):  # type: ignore[no-untyped-def]
 def surfaces_after(tables, mode, surface):  # type: ignore[no-untyped-def]
     """Return the surfaces that the state is on when motion in a mode has met one, as bits."""
     return tables.landed[mode, surface] | (tables.lies_on[mode] & tables.kept[mode, surface])
+
+
+@helper
+def flight_of(functions, tables, mode, wall, t, y, p, workspace):  # type: ignore[no-untyped-def]
+    """Return the mode of a state between the impacts of a chatter: the part of the flight that it is in."""
+    none, empty = workspace.none, workspace.empty
+    code = sign_code(functions, tables.observables, 0, t, y, p, none, empty)
+    flight, below = tables.flights[mode], tables.flights[tables.flights.shape[0] // 2 + mode]
+    if below >= 0 and code >> wall & 1 == 0:
+        flight = below
+    for k in range(tables.observables.shape[0]):
+        if tables.bounds[mode, k] == 1 and leads_to(tables, mode, k, flight):
+            # left by it, a mode of chatter is followed by one of these parts
+            following = mode_after(tables, mode, k, code)
+            if following >= 0 and tables.flights[following] < 0:
+                return following
+    return flight
+
+
+@helper
+def leads_to(tables, mode, surface, target):  # type: ignore[no-untyped-def]
+    """Tell whether a mode may be left for another one where it meets a surface."""
+    place = mode * tables.observables.shape[0] + surface
+    for k in range(tables.first[place], tables.first[place + 1]):
+        if tables.rules[k, 2] == target:
+            return True
+    return False

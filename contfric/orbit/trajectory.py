@@ -18,8 +18,9 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.models.parts import MOST_SURFACES
+from contfric.orbit.ahead import still_left
 from contfric.orbit.resting import impacts_ahead, still_bounced
-from contfric.orbit.sides import mode_after, sign_code, surfaces_after
+from contfric.orbit.sides import flight_of, leads_to, mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import Tables
@@ -42,13 +43,17 @@ RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
 
 class StateWorkspace(NamedTuple):
-    """Workspace for a state at a hit and on trial, and what is handed over where nothing is wanted."""
+    """Workspace for a state at a hit and on trial, and what is handed over where nothing is wanted.
+
+    ``slopes`` is for the derivatives of an observable by time and states.
+    """
 
     none: IntArray
     empty: FloatArray
     nothing: FloatArray
     after: FloatArray
     trial: FloatArray
+    slopes: FloatArray
 
 
 #: How a simulation ended.
@@ -68,9 +73,10 @@ _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
 #: 1 + the wall that was met last if impacts go on alike since, how many impacts to come are known not to lead
-#: to rest, and the unit of time of a model without excitation (1 if less).
-CARRIED = 10
-STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, LEFT, UNIT = range(CARRIED)
+#: to rest, the unit of time of a model without excitation (1 if less), and of a segment of no length the
+#: surfaces that it began on and its mode.
+STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, LEFT, UNIT = range(10)
+BEGUN_ON, BEFORE, CARRIED = 10, 11, 12
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -148,7 +154,7 @@ def begin(carry, on, t, period):  # type: ignore[no-untyped-def]
     cycle = int(math.floor(t / period)) if period > 0.0 else 0
     t -= cycle * period
     carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
-    carry[AT_ONCE] = carry[STRUCK] = carry[BOUNCED] = 0.0
+    carry[AT_ONCE] = carry[STRUCK] = carry[BOUNCED] = carry[BEGUN_ON] = 0.0
     return cycle, t, on
 
 
@@ -167,33 +173,6 @@ def shortest_flight(tables, mode):  # type: ignore[no-untyped-def]
         if tables.bounds[mode, k] == 2:  # a wall bounds every mode
             return NO_FLIGHT
     return NO_TIME
-
-
-@helper
-def flight_of(functions, tables, mode, wall, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return the mode of a state between the impacts of a chatter: the part of the flight that it is in."""
-    none, empty = workspace.none, workspace.empty
-    code = sign_code(functions, tables.observables, 0, t, y, p, none, empty)
-    flight, below = tables.flights[mode], tables.flights[tables.flights.shape[0] // 2 + mode]
-    if below >= 0 and code >> wall & 1 == 0:
-        flight = below
-    for k in range(tables.observables.shape[0]):
-        if tables.bounds[mode, k] == 1 and leads_to(tables, mode, k, flight):
-            # left by it, a mode of chatter is followed by one of these parts
-            following = mode_after(tables, mode, k, code)
-            if following >= 0 and tables.flights[following] < 0:
-                return following
-    return flight
-
-
-@helper
-def leads_to(tables, mode, surface, target):  # type: ignore[no-untyped-def]
-    """Tell whether a mode may be left for another one where it meets a surface."""
-    place = mode * tables.observables.shape[0] + surface
-    for k in range(tables.first[place], tables.first[place + 1]):
-        if tables.rules[k, 2] == target:
-            return True
-    return False
 
 
 @helper
@@ -300,6 +279,9 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     for _ in range(budget):
         if event == rows.joints.shape[0]:
             break
+        if carry[BEGUN_ON] != 0.0:  # without time, what was left before is left still
+            before, begun_on = int(carry[BEFORE]), int(carry[BEGUN_ON])
+            on |= still_left(functions, tables, before, mode, begun_on, t, y, p, unit, workspace)
         left = time_left(carry, cycle, t, period, periods)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         stretch = min(left, allowance - waited, _STRETCH * unit)
@@ -324,6 +306,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
                 continue
             return ALL_TIME, event, mode, cycle, t
         waited = 0.0
+        carry[BEGUN_ON], carry[BEFORE] = float(on) if tau <= NO_TIME * unit else 0.0, float(mode)
         if too_large(y):  # or, where flights were short, they are too short to be resolved
             chatters = carry[STRUCK] != 0.0 and carry[AT_ONCE] > 0.0
             return (CHATTER if chatters else INFINITE), event, mode, cycle, t
@@ -395,5 +378,7 @@ def simulate(functions, tables, mode, on, t, y, p, periods, rows, carry, budget)
     """
     count = y.shape[0]
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
-    workspace = StateWorkspace(none, empty, nothing, np.empty(count), np.empty(count))
+    workspace = StateWorkspace(
+        none, empty, nothing, np.empty(count), np.empty(count), np.empty(1 + count)
+    )
     return follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace)

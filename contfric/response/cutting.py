@@ -50,7 +50,7 @@ def new_workspace(n):  # type: ignore[no-untyped-def]
     """Return workspace for solutions of n states."""
     none, empty, nothing = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
     return Workspace(
-        StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n)),
+        StateWorkspace(none, empty, nothing, np.empty(n), np.empty(n), np.empty(1 + n)),
         Segment(np.zeros(3, dtype=np.int64), np.zeros(1), np.empty(n)),
         Remembered(np.empty((MEMORIES, 4), dtype=np.int64), np.empty((MEMORIES, 1 + n))),
         np.empty(n),

@@ -111,6 +111,28 @@ def test_of_bundled_models(name: str) -> None:
     check_starts(cf.find_orbit(name))
 
 
+@pytest.mark.parametrize("name", ["blade-damper", "coulomb", "jenkins"])
+def test_of_sections(name: str) -> None:
+    """Compiled starts, as those of sweeps, maps and basins, go on as simulations do."""
+    orbit = cf.find_orbit(name)
+    period = orbit.flow.period
+    for t, *y in orbit.begins.tolist():
+        found = cf.poincare(
+            orbit.model,
+            orbit.params,
+            y,
+            section=0.37,
+            time=t,
+            periods=PERIODS,
+            transient=0,
+        )
+        followed = cf.simulate(orbit.model, orbit.params, state=y, time=t, periods=PERIODS + 1)
+        begun = np.floor(t / period)
+        assert len(found.states) >= PERIODS - 1, (t, y)
+        there = followed.sample((begun + found.cycles) * period + found.times)
+        assert np.max(np.abs(found.states - there)) < NEAR, (t, y)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_of_other_bundled_models(name: str) -> None:
