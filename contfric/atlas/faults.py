@@ -129,7 +129,7 @@ def _undetermined(branch: Branch, width: float) -> bool:
     an event that is known better than to the root of rounding is regular.
     """
     own = float(np.ptp(branch.values))
-    if not branch.bridge or own >= _NARROW * (1.0 + np.max(np.abs(branch.values))):
+    if not branch.bridge or own >= _NARROW * (1.0 + np.abs(branch.values).max()):
         return False
     known = [end.bifurcation.accuracy for end in branch.ends if end.bifurcation is not None]
     return any(accuracy > ROUGH and accuracy * width > own for accuracy in known)

@@ -25,7 +25,7 @@ def moved_by_errors(orbit: Orbit, active: int, row: FloatArray, left: float) -> 
     a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
     b[-1] = b[-1] @ close
     weights = _weights(a, b, c[:, :, active], row)
-    if weights is None or not np.all(np.isfinite(weights)):
+    if weights is None or not np.isfinite(weights).all():
         return None
     errors = np.abs(residual) + _rounding(orbit)
     own = np.finfo(float).eps * abs(float(orbit.vector[active]))
@@ -34,7 +34,7 @@ def moved_by_errors(orbit: Orbit, active: int, row: FloatArray, left: float) -> 
 
 def _rounding(orbit: Orbit) -> FloatArray:
     """Return the rounding of every equation of a chain, shape (N m,)."""
-    size = np.max(np.abs(orbit.joints), axis=1)
+    size = np.abs(orbit.joints).max(axis=1)
     size = 1.0 + np.maximum(size, np.append(size[1:], size[0]))
     unit = UNITS * np.finfo(float).eps + orbit.model.rounding
     return np.repeat(unit * size, orbit.joints.shape[1])

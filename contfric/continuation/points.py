@@ -141,7 +141,7 @@ class Point:
     def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
         """Return the point of a branch as an orbit."""
         full = vector.copy()
-        full[active] = self.value
+        full[active] = self.w[0]
         return Orbit(system, self.joints.copy(), full, 0.0)
 
     def as_start(self) -> tuple[FloatArray, FloatArray]:
@@ -220,12 +220,22 @@ class PointRows:
         """Return the arrays up to a row, as the march takes them."""
         from contfric.continuation.geometry import Points
 
-        arrays = vars(self).values()
-        return Points(*(arrays if stop is None else (a[:stop] for a in arrays)))
+        if stop is None:
+            return Points(*vars(self).values())
+        return Points(
+            self.joints[:stop],
+            self.w[:stop],
+            self.tangents[:stop],
+            self.directions[:stop],
+            self.arc[:stop],
+            self.tests[:stop],
+            self.labels[:stop],
+            self.mu[:stop],
+        )
 
     def first(self, count: int) -> PointRows:
         """Return the first rows."""
-        return PointRows(*(array[:count].copy() for array in vars(self).values()))
+        return PointRows(*[array[:count].copy() for array in vars(self).values()])
 
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""
@@ -238,6 +248,19 @@ class PointRows:
             self.labels[k].copy(),
             self.mu[k].copy(),
             float(self.arc[k]),
+        )
+
+    def only(self) -> Point:
+        """Return the first row as a point that shares the arrays: of rows that nothing else is written to."""
+        return Point(
+            self.joints[0],
+            self.w[0],
+            self.tangents[0],
+            self.directions[0],
+            self.tests[0],
+            self.labels[0],
+            self.mu[0],
+            float(self.arc[0]),
         )
 
     def points(self, start: int, stop: int) -> list[Point]:

@@ -6,13 +6,14 @@ parameter, arclength, labels, multipliers) is copied out of the rows when they a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.kept import altered
 from contfric.base.tally import tally
 from contfric.continuation.events import Bifurcation, End
 from contfric.continuation.points import SMALLEST_STEP, Point, PointRows, Settings
@@ -279,16 +280,16 @@ def first_point(
     rows = PointRows.empty(orbit.system, 1)
     rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[orbit.model.index_of(settings.parameter)]
     rows.tangents[0], rows.directions[0] = direction, slope
-    options, start = march_options(0.0, settings.largest, ALONG), rows.point(0).as_start()
-    course = Course(options, settings.box, -1, *start, 0, rows.arrays(1), tally())
+    options, start = march_options(0.0, settings.largest, ALONG), rows.only().as_start()
+    course = Course(options, settings.box, -1, *start, 0, rows.arrays(), tally())
     why, _, _ = march(branch_problem(orbit, settings), course)
-    return None if why == BROKEN else rows.point(0)
+    return None if why == BROKEN else rows.only()
 
 
 def point_before(here: Orbit, point: Point, back: float, settings: Settings) -> Point | None:
     """Solve for the point of a branch this far (in arclength) before one; ``here`` is the orbit at that."""
     vector = here.vector.copy()
     vector[here.model.index_of(settings.parameter)] -= back * point.slope
-    moved = replace(here, joints=here.joints - back * point.tangent, vector=vector)
+    moved = altered(here, joints=here.joints - back * point.tangent, vector=vector)
     found = first_point(moved, settings, point.tangent, point.slope)
-    return None if found is None else replace(found, arc=point.arc - back)
+    return None if found is None else altered(found, arc=point.arc - back)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import System
 
+#: No parameter.
+_NONE = np.empty(0, dtype=np.int64)
 #: Singular values below this share of the largest are zero: at an event they are good to the root of rounding
 #: at worst.
 _NULL = 1e-7
@@ -46,9 +48,9 @@ def linearised(
     from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    chosen = parameters if not isinstance(parameters, bool) else range(len(vector) * parameters)
-    which = np.array(chosen, dtype=np.int64)
+    a, b = np.empty((2, count, m, m))
+    chosen = range(len(vector)) if parameters is True else parameters
+    which = np.array(chosen, dtype=np.int64) if chosen else _NONE
     c, r = np.empty((count, m, len(which))), np.empty((count, m, 1))
     close = np.empty((m, m))
     linearise(

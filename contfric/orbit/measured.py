@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
 from contfric.base.shown import Shown
 
-if TYPE_CHECKING:
+if not TYPE_CHECKING:
+    from contfric.base.kept import cached_property
+else:
+    from functools import cached_property
+
     from contfric.models.definition import FloatArray
     from contfric.orbit.gradient import Gradient
     from contfric.orbit.integrals import Integrals
