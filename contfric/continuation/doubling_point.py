@@ -64,10 +64,7 @@ def opening(orbit: Orbit) -> float:
     if not (orbit.converged and np.isfinite(orbit.joints).all()):
         return float(np.nan)
     p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
-    close = np.eye(len(p))
-    close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time
-    close[1:, 1:] = orbit.system.layout.closing
-    left = p - q @ close
+    left = p - q @ orbit.system.closing
     if not np.isfinite(left).all():  # an orbit that Newton has lost
         return np.nan
     values = np.linalg.svd(left, compute_uv=False)

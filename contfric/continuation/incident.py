@@ -235,8 +235,9 @@ class _Collection:
 def vanishing(orbit: Orbit, least: float) -> list[tuple[EventFunction, Kind]]:
     """Return the locations of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
     found: dict[EventFunction, Kind] = {}
-    for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
-        if not abs(value) < (least if is_linear(test, orbit) else max(least, TANGENTIAL)):
+    widest, margins = max(least, TANGENTIAL), orbit.margins.tolist()
+    for test, value in zip(orbit.system.tests, margins, strict=True):
+        if not (abs(value) < widest and (abs(value) < least or not is_linear(test, orbit))):
             continue
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -139,10 +140,16 @@ class Point:
         return float(self.direction[0])
 
     def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
-        """Return the point of a branch as an orbit."""
+        """Return the point of a branch as an orbit; the same one for the same question."""
+        asked, own = (system, vector, active, self.joints, self.w), vars(self)
+        last: tuple[tuple[object, ...], Orbit] | None = own.get("_orbit")
+        if last is not None and all(map(operator.is_, asked, last[0])):
+            return last[1]
         full = vector.copy()
         full[active] = self.w[0]
-        return Orbit(system, self.joints.copy(), full, 0.0)
+        found = Orbit(system, self.joints.copy(), full, 0.0)
+        own["_orbit"] = asked, found
+        return found
 
     def as_start(self) -> tuple[FloatArray, FloatArray]:
         """Return (joints, tangent) and (parameters, direction) as the march takes them."""

@@ -6,6 +6,7 @@ parameter, arclength, labels, multipliers) is copied out of the rows when they a
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -253,14 +254,29 @@ def march_options(step: float, largest: float, accuracy: float) -> FloatArray:
     return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0, accuracy])
 
 
+class _LastProblem(threading.local):
+    """The branch last at work in this thread: its pieces and its events ask for it again and again."""
+
+    orbit: Orbit | None = None
+    settings: Settings | None = None
+    problem: BranchProblem
+
+
+_LAST = _LastProblem()
+
+
 def branch_problem(orbit: Orbit, settings: Settings) -> BranchProblem:
     """Return the branch of an orbit as the compiled engine takes it."""
     from contfric.continuation.steps import BranchProblem
 
-    system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
-    scale = np.array([settings.scale])
-    functions, layout = system.functions(), system.layout
-    return BranchProblem(functions, layout, orbit.vector, which, scale, settings.stability)
+    if _LAST.orbit is not orbit or _LAST.settings is not settings:
+        system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
+        scale, functions = np.array([settings.scale]), system.functions()
+        _LAST.problem = BranchProblem(
+            functions, system.layout, orbit.vector, which, scale, settings.stability
+        )
+        _LAST.orbit, _LAST.settings = orbit, settings
+    return _LAST.problem
 
 
 def first_point(

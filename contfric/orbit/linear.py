@@ -5,6 +5,7 @@ For single orbits; along a branch the engine has the pencil from the elimination
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -117,7 +118,7 @@ def tangent_of(
     wanted[size] = 1.0
     null: FloatArray = np.cos(np.arange(1.0, size + 2.0))  # no direction of an orbit
     for _ in range(2):
-        full[size] = null / np.linalg.norm(null)
+        full[size] = null / math.sqrt(null.dot(null))
         null = np.asarray(np.linalg.solve(full, wanted), dtype=np.float64)
     return null[:size].reshape(joints.shape), float(null[size])
 

@@ -200,9 +200,16 @@ def swap_stops(
 
 def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model) -> Edit:
     """Return the edit that swaps stick and reversal at stops; see :func:`swap_stops`."""
+    return _swap_edit(tuple(segments), tuple(events.items()), model)
+
+
+@cache
+def _swap_edit(
+    segments: ReducedItinerary, events: tuple[tuple[int, str], ...], model: Model
+) -> Edit:
     itinerary = _checked(segments, model)
     edit = Edit()
-    for joint, surface in events.items():
+    for joint, surface in events:
         following = _stop(itinerary, joint, surface, model)
         if model.lies_on(itinerary[following][0], itinerary[joint][1]):
             edit |= drop(_removable(itinerary, following, surface))
