@@ -42,10 +42,10 @@ _T = TypeVar("_T")
 
 
 @functools.cache
-def _names(kind: Any) -> frozenset[str]:
+def _names(kind: Any) -> tuple[str, ...]:
     """Return the fields of a data class that nothing else is made from when it is created."""
     assert not hasattr(kind, "__post_init__") and all(field.init for field in fields(kind))
-    return frozenset(field.name for field in fields(kind))
+    return tuple(field.name for field in fields(kind))
 
 
 def altered(one: _T, **changes: Any) -> _T:
@@ -66,9 +66,7 @@ def altered(one: _T, **changes: Any) -> _T:
     """
     kind: Any = type(one)
     made: _T = object.__new__(kind)
-    own, names = made.__dict__, _names(kind)
-    for name, value in one.__dict__.items():
-        if name in names:
-            own[name] = value
-    own.update(changes)
+    own, before = made.__dict__, one.__dict__
+    for name in _names(kind):
+        own[name] = changes[name] if name in changes else before[name]
     return made
