@@ -107,28 +107,29 @@ def _matrix_of_turn(
     a, b, close : blocks and closures of the orbits, shapes (k, N, m, m) and (k, m, m); the first two are
         changed in place
     """
-    count, m = len(a), a.shape[-1]
-    pins = _pins(system, a, b)
+    (count, segments, m), pins = a.shape[:3], _pins(system, a, b)
     holds = len(pins)
     size = m + holds * times
+    last = np.zeros((count, segments, m, 1))
+    last[:, :, -1] = 1.0
+    try:  # joints from those before them, and from the lengths of holds
+        steps = np.linalg.solve(b, np.concatenate([-a, last], axis=3))
+    except np.linalg.LinAlgError:  # an exit is tangential
+        return None
     moved: FloatArray = np.zeros((count, m, size))
     moved[:, range(m), range(m)] = 1.0
     found = np.zeros((count, size, size))
     rows = found[:, m:]
-    try:
-        for turn in range(times):
-            for i in range(system.segments):
-                before, right = moved, -a[:, i] @ moved
-                if i in pins:
-                    right[:, -1, m + turn * holds + pins[i].number] += 1.0
-                moved = np.asarray(np.linalg.solve(b[:, i], right), dtype=np.float64)
-                for pin in pins.values():
-                    if pin.segment == i:
-                        row = pin.on_start @ before + pin.on_end @ moved
-                        rows[:, turn * holds + pin.number] = row[:, 0]
-            moved = np.asarray(np.linalg.solve(close, moved), dtype=np.float64)
-    except np.linalg.LinAlgError:  # an exit is tangential
-        return None
+    for turn in range(times):
+        for i in range(segments):
+            before, moved = moved, steps[:, i, :, :m] @ moved
+            if i in pins:
+                moved[:, :, m + turn * holds + pins[i].number] += steps[:, i, :, m]
+            for pin in pins.values():
+                if pin.segment == i:
+                    row = pin.on_start @ before + pin.on_end @ moved
+                    rows[:, turn * holds + pin.number] = row[:, 0]
+        moved = np.asarray(np.linalg.solve(close, moved), dtype=np.float64)
     found[:, :m] = sign * moved
     found[:, :m, :m] = np.eye(m) - found[:, :m, :m]
     rows[:, :, m:] *= -1.0
