@@ -176,9 +176,9 @@ class Orbit(MeasuredOrbit):
 
     def as_half(self) -> Orbit:
         """Return a symmetric orbit as a problem on its half; any other orbit as it is."""
-        half = (
-            None if self.system.half else half_of(self.model, self.system.itinerary, self.periods)
-        )
+        if self.system.half:
+            return self
+        half = half_of(self.model, self.system.itinerary, self.periods)
         if half is None or not self.symmetric:
             return self
         system = build_system(self.model, half, self.periods, half=True)
@@ -194,9 +194,8 @@ class Orbit(MeasuredOrbit):
             pair in self.model.sections for pair in whole.itinerary
         ):
             # a smooth cycle is found by one crossing each way, however long it is
-            return altered(
-                whole, system=build_system(self.model, whole.itinerary, self.periods * 2)
-            )
+            system = build_system(self.model, whole.itinerary, self.periods * 2)
+            return altered(whole, system=system)
         system = build_system(self.model, whole.itinerary * 2, self.periods * 2)
         joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
         return altered(whole, system=system, joints=joints)
@@ -242,12 +241,10 @@ class Orbit(MeasuredOrbit):
     def _watched(self) -> tuple[FloatArray, NDArray[np.int64], bool]:
         from contfric.orbit.monitor import examine
 
-        layout = self.system.layout
-        count = len(self.system.tests)
+        layout, count = self.system.layout, len(self.system.tests)
         watched = np.empty(count + len(layout.labels))
-        labels = np.zeros(len(layout.labels), dtype=np.int64)
-        at = self.system.functions(), layout, self.joints, self.vector
-        fine = examine(*at, watched, labels, tally())
+        labels, at = np.zeros(len(layout.labels), dtype=np.int64), (self.joints, self.vector)
+        fine = examine(self.system.functions(), layout, *at, watched, labels, tally())
         return watched[:count], labels, bool(fine)
 
     @cached_property
