@@ -7,7 +7,7 @@ counts, and ratios are medians over rounds of the ratio within one. Solves are c
 thousandth away, the call of one kernel; and a point of a branch, with its multipliers and margins.
 A gradient is asked of the orbit as find_orbit returns it, so that it is what comes on top of the
 solve; "several" are all of them, asked of one orbit, and "at once" by one call of ``gradients``. "orbit" is
-dz/dp, the derivatives of all joints by all parameters, which they share; every other one has it computed anew.
+dz/dp, the derivatives of joints by parameters: they share it, and every other one has it computed anew.
 """
 
 from __future__ import annotations
