@@ -101,10 +101,11 @@ def in_advance() -> Iterator[None]:
 @contextmanager
 def cores_are_busy() -> Iterator[None]:
     """Begin nothing in advance while the block runs: it is one of many tasks, which have all cores."""
-    token = _BESIDE.set(True)
+    token, outer = _BESIDE.set(True), _HERE.set(None)
     try:
         yield
     finally:
+        _HERE.reset(outer)
         _BESIDE.reset(token)
 
 

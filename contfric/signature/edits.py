@@ -200,7 +200,8 @@ def swap_stops(
 
 def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model) -> Edit:
     """Return the edit that swaps stick and reversal at stops; see :func:`swap_stops`."""
-    return _swap_edit(tuple(segments), tuple(events.items()), model)
+    pairs = tuple((mode, surface) for mode, surface in segments)
+    return _swap_edit(pairs, tuple(events.items()), model)
 
 
 @cache
