@@ -16,7 +16,7 @@ from contfric.quantities.extreme import integrated, is_compiled
 from contfric.quantities.functionals import Asked, Measuring, Totals
 from contfric.quantities.inside import Inside, inside_of
 from contfric.quantities.measure import NumberWithGradient, differentiated
-from contfric.quantities.motion import Directions, OrbitMotion
+from contfric.quantities.motion import Directions, OrbitMotion, goes_on
 from contfric.quantities.registry import Quantity
 from contfric.quantities.tape import Tape
 
@@ -48,18 +48,32 @@ def _totals(measuring: Measuring, quantities: Sequence[Quantity]) -> Iterable[tu
     rates = list(dict.fromkeys(rate for _, rate in asked if rate)) or [0.0]
     for number, rate in enumerate(rates):
         group = [each for each in asked if each[1] == rate or (not number and not each[1])]
-        if len(group) < 2:  # that alone is as quick by itself
-            continue
-        tape = _tape(measuring.inside, tuple(functional for functional, _ in group))
-        found = measuring.integrals(tape, rate)
-        if found is None:
-            continue
-        values, slopes = found
-        at = 0
-        for each in group:
-            rows = slice(at, at + (2 if each[1] else 1))
-            at = rows.stop
-            yield each, (values[rows], slopes[rows])
+        yield from _in_one_pass(measuring, group, rate)
+
+
+def _in_one_pass(
+    measuring: Measuring, group: list[Asked], rate: float
+) -> Iterable[tuple[Asked, Totals]]:
+    """Yield the integrals of a group; nothing where it is one alone, or compiled code leaves them.
+
+    That may leave what has kinks to panels, and an integrated model carries none of that along.
+    """
+    smooth = [each for each in group if not len(measuring.inside.tape(each[0]).noted)]
+    if goes_on(measuring.motion.orbit.model):
+        group = smooth
+    if len(group) < 2:
+        return
+    found = measuring.integrals(_tape(measuring.inside, tuple(f for f, _ in group)), rate)
+    if found is None:
+        if len(smooth) < len(group):
+            yield from _in_one_pass(measuring, smooth, rate)
+        return
+    values, slopes = found
+    at = 0
+    for each in group:
+        rows = slice(at, at + (2 if each[1] else 1))
+        at = rows.stop
+        yield each, (values[rows], slopes[rows])
 
 
 def _functionals(quantity: Quantity) -> list[Functional]:
