@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from contfric.models.quantity_texts import Functional
-from contfric.orbit.orbit import Orbit
 from contfric.quantities.extreme import integrated, is_compiled
 from contfric.quantities.functionals import Asked, Measuring, Totals
 from contfric.quantities.inside import Inside, inside_of
@@ -19,6 +19,9 @@ from contfric.quantities.measure import NumberWithGradient, differentiated
 from contfric.quantities.motion import Directions, OrbitMotion, goes_on
 from contfric.quantities.registry import Quantity
 from contfric.quantities.tape import Tape
+
+if TYPE_CHECKING:
+    from contfric.orbit.orbit import Orbit
 
 #: Sets of expressions whose operations are kept: a loop over orbits asks for the same ones.
 _KEPT = 64
