@@ -23,7 +23,7 @@ from contfric.remember.stored import made_of
 
 if not TYPE_CHECKING:
     from contfric.base.kept import cached_property
-else:
+if TYPE_CHECKING:
     from functools import cached_property
 
     from contfric.certify.events import EventCertificate

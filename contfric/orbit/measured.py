@@ -9,7 +9,7 @@ from contfric.base.shown import Shown
 
 if not TYPE_CHECKING:
     from contfric.base.kept import cached_property
-else:
+if TYPE_CHECKING:
     from functools import cached_property
 
     from contfric.models.definition import FloatArray

@@ -29,7 +29,7 @@ from contfric.signature import Signature
 
 if not TYPE_CHECKING:
     from contfric.base.kept import cached_property
-else:
+if TYPE_CHECKING:
     from functools import cached_property
     from pathlib import Path
 
