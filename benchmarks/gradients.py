@@ -6,8 +6,8 @@ counts, and ratios are medians over rounds of the ratio within one. Solves are c
 (find_orbit); the user's call of a signature, from nothing; Newton's method from an orbit at parameters a
 thousandth away, the call of one kernel; and a point of a branch, with its multipliers and margins.
 A gradient is asked of the orbit as find_orbit returns it, so that it is what comes on top of the
-solve; "several" are all of them, asked of one orbit. "orbit" is dz/dp, the derivatives of all joints by all
-parameters, which they share; every other one has it computed anew.
+solve; "several" are all of them, asked of one orbit, and "at once" by one call of ``gradients``. "orbit" is
+dz/dp, the derivatives of joints by parameters: they share it, and every other one has it computed anew.
 """
 
 from __future__ import annotations
@@ -80,6 +80,7 @@ def calls(name: str) -> dict[str, Callable[[], Any]]:
             orbit.gradient(quantity)
 
     timed["several, gradient"] = several
+    timed["at once, gradients"] = lambda: fresh().gradients(asked)
     return timed
 
 

@@ -107,8 +107,12 @@ class Kernel:
 
     It is called from Python without numba's look at the types of its arguments: the look costs about
     60 microseconds a call with the engine's arguments, and there is one signature only. What is
-    handed over must have exactly the types of the signature.
+    handed over must have exactly the types of the signature. Python finds the compiled function itself
+    in the slot of the instance: a method would be a frame of its own for each call.
     """
+
+    __slots__ = ("__call__", "__dict__", "__weakref__")
+    __call__: Callable[..., Any]
 
     def __init__(
         self,
@@ -125,6 +129,7 @@ class Kernel:
         self._optimisation = _VECTORS if vectors else OPTIMISATION
         #: Added to the name of its folder: one function may be compiled for several signatures.
         self.label = label
+        self.__call__ = self._first_call
 
     @property
     def name(self) -> str:
@@ -185,9 +190,10 @@ class Kernel:
         (result,) = self.dispatcher.overloads.values()
         return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the compiled code."""
-        return self.entry(*arguments)
+    def _first_call(self, *arguments: Any) -> Any:
+        """Call the compiled code, from now on without a detour."""
+        self.__call__ = entry = self.entry
+        return entry(*arguments)
 
 
 #: Processes that compile a kernel into the cache, by its name "module:kernel".

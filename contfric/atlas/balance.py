@@ -196,7 +196,7 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
     if all(model.is_at_rest(mode) for mode, _ in run.itinerary):
         return True
     visited = np.array([*run.states, run.last[2]])  # where one mass rests others may move
-    return bool(np.max(np.abs(visited - state)) < _STILL)
+    return bool(np.abs(visited - state).max() < _STILL)
 
 
 def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
@@ -240,7 +240,7 @@ def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterato
     for (a, one), (b, other) in pairwise(locations):
         ends = (diagram.nodes[k].bifurcation.params[diagram.parameter] for k in (one, other))
         part = (*ends, *branch.values[(branch.arc >= a) & (branch.arc <= b)])
-        if continuum or np.max(np.abs(np.subtract(part, value))) <= slack:
+        if continuum or np.abs(np.subtract(part, value)).max() <= slack:
             yield one, other
 
 

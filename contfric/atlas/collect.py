@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
 from contfric.atlas.matching import ROUNDING, same_event, same_location, telling_kind
+from contfric.base.kept import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,
@@ -159,7 +160,7 @@ def _with_proposals(
     for event in events:
         event.bifurcation = _best_located(event, settings)
         proposals = tuple(
-            p if p.branch is None else replace(p, branch=location[p.branch])
+            p if p.branch is None else altered(p, branch=location[p.branch])
             for p in event.proposals
         )
         kind = telling_kind([*event.kinds, *(member.kind for member in event.members)])
@@ -168,7 +169,7 @@ def _with_proposals(
         for member in event.members:
             same = kind is member.kind and proposals == member.proposals
             changed[id(member)] = (
-                member if same else replace(member, kind=kind, proposals=proposals)
+                member if same else altered(member, kind=kind, proposals=proposals)
             )
         event.bifurcation = changed[id(event.bifurcation)]
         event.members = [changed[id(member)] for member in event.members]
@@ -190,14 +191,14 @@ def _renewed(
             reason = end.reason  # a branch that ends where another one turns keeps its own
             if now.kind is not b.kind and now.kind is not Kind.SN:
                 reason = EndReason[now.kind.name]
-            ends.append(replace(end, reason=reason, bifurcation=now))
+            ends.append(altered(end, reason=reason, bifurcation=now))
     found = tuple(changed.get(id(b), b) for b in branch.bifurcations)
-    return replace(branch, bifurcations=found, ends=(ends[0], ends[1]))
+    return altered(branch, bifurcations=found, ends=(ends[0], ends[1]))
 
 
 def _not_followed(end: End) -> End:
     """Return an end that could be followed and was not, saying so."""
-    return replace(end, message=f"{end}; not followed (its bifurcation says why)")
+    return altered(end, message=f"{end}; not followed (its bifurcation says why)")
 
 
 def _nodes(event: Event, location: dict[int, int], image: dict[int, int]) -> list[Node]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
 from contfric.atlas.short_branches import begins_at_short
+from contfric.base.kept import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
@@ -108,7 +108,7 @@ def explore(
     again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
     most = max(max_periods or MOST_PERIODS, orbit.periods)
     # multipliers are asked for also where the start itself is on a bridge
-    settings = replace(settings, stability=stability, copies=again, up_to_mirror=True)
+    settings = altered(settings, stability=stability, copies=again, up_to_mirror=True)
     state = Exploration(settings, most, again, max_branches, bridges, progress)
     if orbit.periods > (max_periods or MOST_PERIODS):
         state.notes.append(
@@ -128,7 +128,7 @@ def explore(
             state.events,
             tuple(state.notes),
             state.complete,
-            replace(asked, max_periods=state.max_periods, copies=state.copies),
+            altered(asked, max_periods=state.max_periods, copies=state.copies),
         )
 
 
@@ -149,7 +149,7 @@ def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:
 def _first_branch(state: Exploration, orbit: Orbit) -> Branch:
     """Return the branch through the start; of a continuum the one through its symmetric orbit."""
     settings = state.settings
-    settings = replace(settings, stability=settings.stability and not orbit.system.holds)
+    settings = altered(settings, stability=settings.stability and not orbit.system.holds)
     try:
         return follow_orbit(orbit, settings, state.progress, keep=True)
     except ConvergenceError:

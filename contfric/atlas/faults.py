@@ -41,18 +41,20 @@ def fault_of_itinerary(orbit: Orbit) -> str | None:
 
 def fault_of(branch: Branch, width: float) -> str | None:
     """Return what is wrong with a branch; None if nothing is. ``width`` is that of the parameter's range."""
-    found = next((why for is_so, why in _FAULTS if is_so(branch)), None)
+    at = sorted({round(share * (len(branch) - 1)) for share in _ASKED})
+    asked = [branch[k] for k in at]
+    found = next((why for is_so, why in _FAULTS if is_so(branch, at, asked)), None)
     if found is None and _undetermined(branch, width):
         return "rounding leaves no place of its end in the range: its equations are singular there"
     return found
 
 
-def _only_touches(branch: Branch) -> bool:
+def _only_touches(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether an itinerary has modes that no periodic motion is in (:mod:`contfric.orbit.one_way`)."""
-    return fault_of_itinerary(branch[0]) is not None
+    return fault_of_itinerary(asked[0]) is not None
 
 
-def _never_held(branch: Branch) -> bool:
+def _never_held(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether a hold has no length at any point of a branch: the equations hold, and nothing is held.
 
     Where orbits are a continuum, those of them that touch rest solve the equations of a hold for every value
@@ -75,7 +77,7 @@ def _no_longer(
     at = list(asked)
     times = branch.joints[at, :, 0]
     ends = times[:, :1] + branch.turns_at(at)[:, None]
-    lasts: FloatArray = np.diff(times, append=ends, axis=1)
+    lasts: FloatArray = np.concatenate([times[:, 1:], ends], axis=1) - times
     for segment in segments:
         k = int(np.argmax(lasts[:, segment]))
         if lasts[k, segment] >= least:
@@ -93,43 +95,39 @@ def _lasts(orbit: Orbit, parameter: str, segment: int) -> bool:
     return error is not None and bool(orbit.ends[segment, 0] - orbit.cycle[segment, 0] > error)
 
 
-def _never_lasts(branch: Branch) -> bool:
+def _never_lasts(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
 
     Where orbits are a continuum those of them that touch a surface solve the equations of an itinerary with a
     segment there, of no length. A segment that comes in at an event grows at least with the distance.
     """
-    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
     least = min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])
-    return any(_no_longer(branch, asked, range(branch.system.segments), least))
+    return any(_no_longer(branch, at, range(branch.system.segments), least))
 
 
-def _stands(branch: Branch) -> bool:
+def _stands(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether a slide stands in its equilibrium all along a branch: its orbits are those without it.
 
     How long it stands is free, so the equations hold along a line on which the solution does not change.
     Where it moves, its acceleration grows at least with the distance.
     """
     least = min(STANDS, _NO_SHARE * branch.arc[-1])
-    orbits = [branch[k] for k in {round(share * (len(branch) - 1)) for share in _ASKED}]
     return any(
-        all(goes_nowhere(orbit, i, least) for orbit in orbits)
-        for i in range(branch.system.segments)
+        all(goes_nowhere(orbit, i, least) for orbit in asked) for i in range(branch.system.segments)
     )
 
 
-def _repeats(branch: Branch) -> bool:
+def _repeats(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether the orbits of a branch are shorter ones that are run through several times.
 
     Where an orbit begins at a graze its rounding is the root of rounding, and does not tell; the branch does.
     """
     if branch.system.periods == 1:
         return False
-    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
-    return all(shortest(orbit) is not orbit for orbit in (branch[k] for k in asked))
+    return all(shortest(orbit) is not orbit for orbit in asked)
 
 
-def _is_symmetric(branch: Branch) -> bool:
+def _is_symmetric(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether the orbits of a branch that is solved as a whole are their own symmetry images.
 
     A symmetric branch is solved on its half: this one is reached by a step off an event near its end. Near
@@ -138,8 +136,7 @@ def _is_symmetric(branch: Branch) -> bool:
     """
     if branch.system.half or branch.model.symmetry is None:
         return False
-    asked = {round(share * (len(branch) - 1)) for share in _ASKED}
-    return sum(branch[k].symmetric for k in asked) > len(asked) / 2
+    return sum(orbit.symmetric for orbit in asked) > len(asked) / 2
 
 
 def _undetermined(branch: Branch, width: float) -> bool:
@@ -150,13 +147,13 @@ def _undetermined(branch: Branch, width: float) -> bool:
     an event that is known better than to the root of rounding is regular.
     """
     own = float(np.ptp(branch.values))
-    if not branch.bridge or own >= _NARROW * (1.0 + np.max(np.abs(branch.values))):
+    if not branch.bridge or own >= _NARROW * (1.0 + np.abs(branch.values).max()):
         return False
     known = [end.bifurcation.accuracy for end in branch.ends if end.bifurcation is not None]
     return any(accuracy > ROUGH and accuracy * width > own for accuracy in known)
 
 
-def _violates(branch: Branch) -> bool:
+def _violates(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether a short branch violates one condition at all of its points after the first.
 
     Near a singular event conditions change by the square of the distance. A branch that leaves it on the
@@ -168,7 +165,7 @@ def _violates(branch: Branch) -> bool:
     return bool(margins.size and np.min(np.max(margins, axis=0)) < -_ROUNDING)
 
 
-#: What a branch must not be, and why it is refused then.
+#: What a branch must not be, and why it is refused then; asked with some of its points and their orbits.
 _FAULTS = (
     (_only_touches, ONLY_GROWS),
     (

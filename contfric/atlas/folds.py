@@ -152,7 +152,7 @@ def _ways_through(orbit: Orbit, active: int) -> list[FloatArray]:
     if found or not orbit.system.half:
         return found
     vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    return [vector / np.max(np.abs(vector)) for vector in vectors]
+    return [vector / np.abs(vector).max() for vector in vectors]
 
 
 def _add_crossing(

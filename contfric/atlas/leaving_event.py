@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -13,6 +12,7 @@ from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.lines import ways_in_plane
 from contfric.atlas.matching import SAME_SOLUTION
 from contfric.atlas.several_locations import opening_together
+from contfric.base.kept import altered
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
@@ -89,7 +89,7 @@ def from_admissible(branch: Branch, orbit: Orbit) -> Branch:
         return branch
     joints, values = branch.joints.copy(), branch.values.copy()
     joints[0], values[0] = orbit.joints, orbit.params[branch.parameter]
-    return replace(branch, joints=joints, values=values)
+    return altered(branch, joints=joints, values=values)
 
 
 def _longest_way(
@@ -117,11 +117,11 @@ def _ways(
     What Newton's method finds farther away is no orbit at the event.
     """
     active = orbit.model.index_of(settings.parameter)
-    farthest = known * (1.0 + float(np.max(np.abs(orbit.joints))))
+    farthest = known * (1.0 + float(np.abs(orbit.joints).max()))
     tried: list[Point] = []
     for tangent, slope in directions(orbit, active):
         start = first_point(orbit, settings, tangent, slope)
-        if start is None or not np.max(np.abs(start.joints - orbit.joints)) <= farthest:
+        if start is None or not np.abs(start.joints - orbit.joints).max() <= farthest:
             continue
         if any(_is_along(start, known_way, settings) for known_way in tried):
             continue
@@ -159,9 +159,9 @@ def _leave_beside(
         vector = orbit.vector.copy()
         vector[active] += distance * orbit.period * share
         away = way(distance * orbit.period)
-        known = ((away / np.max(np.abs(away)), share),) if share else ()
+        known = ((away / np.abs(away).max(), share),) if share else ()
         joints = orbit.joints + away
-        moved = replace(orbit, joints=joints, vector=vector)
+        moved = altered(orbit, joints=joints, vector=vector)
         for tangent, slope in chain(known, directions(moved, active)):
             point = first_point(moved, settings, tangent, slope)
             if point is None:
@@ -174,7 +174,7 @@ def _leave_beside(
             point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
             side = _trace(there, point, settings, _NEAR_EVENT[0], state.progress)
             if there.admissible and side.count > 1:
-                origin = replace(
+                origin = altered(
                     point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)])
                 )
                 origin.arc = 0.0
@@ -243,7 +243,7 @@ def _line_of(orbit: Orbit, active: int, settings: Settings) -> Iterator[FloatArr
         first_point(orbit, settings, *way) is not None for way in directions(orbit, active)
     ):
         return
-    away = vectors[0] / np.max(np.abs(vectors[0]))
+    away = vectors[0] / np.abs(vectors[0]).max()
     yield away
     yield -away
 
@@ -258,7 +258,7 @@ def _trace(
 
 def settings_for(orbit: Orbit, settings: Settings) -> Settings:
     """Return the settings for a branch: on a bridge there are no multipliers."""
-    return replace(settings, stability=False) if orbit.system.holds else settings
+    return altered(settings, stability=False) if orbit.system.holds else settings
 
 
 def went_somewhere(side: Side, event: Event) -> bool:
@@ -273,7 +273,7 @@ def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -
     stable: bool | None = False if side_is_bridge(side) else None
     if settings.stability and not side_is_bridge(side):
         stable = bool(np.all(np.abs(side.second_multipliers) < 1.0))
-    here = replace(b, position=0.0, stable_before=None, stable_after=stable)
+    here = altered(b, position=0.0, stable_before=None, stable_after=stable)
     return End(reason, f"{EndReason.START.value}: {where(b, settings.parameter)}", here)
 
 
@@ -286,12 +286,12 @@ def _end_where_it_began(side: Side, there: Point, event: Event, settings: Settin
     if side.end.reason is not EndReason.CLOSED:
         return
     b, grows = event.bifurcation, side.tip.value > side.before_tip.value
-    side.put_tip(replace(there, arc=side.position))
+    side.put_tip(altered(there, arc=side.position))
     stable: bool | None = False if side_is_bridge(side) else None
     if settings.stability and not side_is_bridge(side):
         stable = bool(np.all(np.abs(side.before_tip.mu) < 1.0))
     before, after = (stable, None) if grows else (None, stable)
-    here = replace(b, position=side.position, stable_before=before, stable_after=after)
+    here = altered(b, position=side.position, stable_before=before, stable_after=after)
     side.end = End(EndReason[b.kind.name], where(b, settings.parameter), here)
 
 

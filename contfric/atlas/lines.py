@@ -39,7 +39,7 @@ def ways_in_plane(orbit: Orbit, active: int) -> Iterator[tuple[FloatArray, float
     for angle in regular if lines is None else lines:
         away = np.cos(angle) * vectors[0] + np.sin(angle) * vectors[1]
         share = 0.0 if lines is None else np.cos(angle) * slopes[0] + np.sin(angle) * slopes[1]
-        size = np.max(np.abs(away))
+        size = np.abs(away).max()
         yield away / size, float(share / size)
 
 
@@ -55,7 +55,7 @@ def _lines(orbit: Orbit, active: int, vectors: FloatArray, slopes: FloatArray) -
     one, other, mixed = form[0], form[1], form[2] - 0.5 * (form[0] + form[1])
     size = max(abs(one), abs(other), abs(mixed))
     inside = mixed * mixed - one * other
-    if not np.all(np.isfinite(form)) or size < _BENT or abs(inside) < _CLEAR * size * size:
+    if not np.isfinite(form).all() or size < _BENT or abs(inside) < _CLEAR * size * size:
         return None
     if inside < 0.0:
         return np.empty(0)

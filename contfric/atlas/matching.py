@@ -162,7 +162,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
         return _in_family(orbit, branch, mirror)
     for _, guess in guesses(branch, orbit.vector, value):
         solved = refine(guess, damped=False)
-        same = _SAME_ORBIT * (1.0 + float(np.max(np.abs(orbit.stops), initial=0.0)))
+        same = _SAME_ORBIT * (1.0 + float(np.abs(orbit.stops).max(initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
         if alike and orbit.outline.apart(solved.outline) < SAME_SOLUTION:
             return True

@@ -107,7 +107,7 @@ def cells_of(box: PlaneRanges, curve: Curve) -> tuple[NDArray[np.int64], NDArray
     found = []
     for part in curve.parts:
         at = (part.values - box.low) / box.widths * CELLS
-        along = np.concatenate([[0.0], np.cumsum(np.max(np.abs(np.diff(at, axis=0)), axis=1))])
+        along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(at, axis=0)).max(axis=1))])
         locations = np.linspace(0.0, along[-1], 2 + int(3.0 * along[-1]))
         found.append(np.column_stack([np.interp(locations, along, at[:, k]) for k in (0, 1)]))
     cells = np.clip(np.concatenate(found).astype(np.int64), 0, CELLS - 1)

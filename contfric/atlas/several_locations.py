@@ -108,7 +108,7 @@ def _of_locations(null: FloatArray) -> FloatArray | None:
         if np.sum(size > 0.5) != 1:  # eigenvalues of a projector are 0 and 1
             return None
         vector = vectors[:, -1].reshape(count, m)
-        found.append(vector / np.max(np.abs(vector)))
+        found.append(vector / np.abs(vector).max())
     return np.array(found) if len(found) == k else None
 
 

@@ -107,7 +107,7 @@ def _hold_starts(orbit: Orbit) -> list[FloatArray]:
 
 def _passing(place: FloatArray, rests: list[list[FloatArray]], cycle: float) -> int:
     """Return how many orbits, of which each has some rests, pass one place; times are modulo the cycle."""
-    near = _SAME * (1.0 + float(np.max(np.abs(place[1:]))))
+    near = _SAME * (1.0 + float(np.abs(place[1:]).max()))
 
     def apart(there: FloatArray) -> float:
         gaps = np.abs(there - place)

@@ -112,8 +112,8 @@ def _parabola(orbit: Orbit, phi: FloatArray, settings: Settings) -> _Parabola | 
         bend = (point.joints - moved.joints) / distance**2
         found.append((bend, (point.value - value) / distance**2, point))
     (bend, rise, beside), (nearer, other, _) = found
-    misses = np.max(np.abs(bend - nearer)), abs(rise - other) / settings.width
-    size = np.max(np.abs(bend)) + abs(rise) / settings.width
+    misses = np.abs(bend - nearer).max(), abs(rise - other) / settings.width
+    size = np.abs(bend).max() + abs(rise) / settings.width
     if max(misses) > _MISSED * size:
         return None
     return _Parabola(orbit, phi, bend, rise, beside, settings)

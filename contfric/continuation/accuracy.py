@@ -14,11 +14,11 @@ an equation at the located point, and the rounding of the motion there. The sum 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.kept import altered, cached_property
 from contfric.continuation.doubling_point import opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient
@@ -224,7 +224,7 @@ def _error_of(orbit: Orbit, active: int, condition: _Condition) -> float | None:
     value = condition.value(orbit)
     if not np.isfinite(value):
         return None
-    scale = 1.0 + float(np.max(np.abs(orbit.joints)))
+    scale = 1.0 + float(np.abs(orbit.joints).max())
     left = abs(value) + orbit.model.rounding * scale
     return moved_by_errors(orbit, active, _gradient(orbit, active, condition, value), left)
 
@@ -247,11 +247,11 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
             joints = orbit.joints.copy()
             step = _DIFFERENCE * (1.0 + abs(joints[i, j]))
             joints[i, j] += step
-            row[i * m + j] = (condition.value(replace(orbit, joints=joints)) - value) / step
+            row[i * m + j] = (condition.value(altered(orbit, joints=joints)) - value) / step
     vector = orbit.vector.copy()
     step = _DIFFERENCE * (1.0 + abs(vector[active]))
     vector[active] += step
-    row[-1] = (condition.value(replace(orbit, vector=vector)) - value) / step
+    row[-1] = (condition.value(altered(orbit, vector=vector)) - value) / step
     return row
 
 
@@ -280,18 +280,18 @@ def _miss(kind: Kind, here: Orbit, active: int, distance: float, clear: float) -
     for k in _NEIGHBOURS:
         vector = here.vector.copy()
         vector[active] += k * distance
-        orbit = refine(replace(here, vector=vector), damped=False)
+        orbit = refine(altered(here, vector=vector), damped=False)
         if not orbit.converged:
             return None
         shifts.append(float(vector[active] - here.vector[active]))
         # where -1 is what it is, the pencil says it without multipliers, and on a bridge too
         minus = kind is not Kind.NS and critical(kind, orbit) < 0.0
         found.append(opening(orbit) if minus else off_circle(kind, orbit))
-    if not np.all(np.isfinite(found)):
+    if not np.isfinite(found).all():
         return None
     x = np.array(shifts) / distance
     fit = np.polynomial.polynomial.polyfit(x, found, 2)
-    missed = float(np.max(np.abs(np.polynomial.polynomial.polyval(x, fit) - found)))
+    missed = float(np.abs(np.polynomial.polynomial.polyval(x, fit) - found).max())
     if abs(fit[1]) <= clear * missed:
         return None
     return float(distance * (abs(fit[0]) + _MISSED * missed) / abs(fit[1]))
@@ -308,13 +308,13 @@ def not_critical(bifurcation: Bifurcation, before: Point, after: Point, settings
     if not settings.stability or kind not in _CRITICAL or not bifurcation.located:
         return ""
     off = abs(off_circle(kind, orbit))
-    largest = float(np.max(np.abs(orbit.turn_multipliers), initial=0.0))
+    largest = float(np.abs(orbit.turn_multipliers).max(initial=0.0))
     if kind is not Kind.SN and _EPS * largest > _HIDDEN:  # a fold is seen by its parameter
         return f"{_none_of(bifurcation)} next to multipliers of {largest:.2g} rounding decides its test"
     changes = 0.0
-    if before.mu.size and np.all(np.isfinite([before.mu, after.mu])):
+    if before.mu.size and np.isfinite([before.mu, after.mu]).all():
         s = critical(kind, orbit)
-        changes = min(float(np.min(np.abs(point.mu - s))) for point in (before, after))
+        changes = min(float(np.abs(point.mu - s).min()) for point in (before, after))
     if off <= max(_ON_CIRCLE * (1.0 + largest), _OF_CHANGE * changes):
         return ""
     return (

@@ -71,10 +71,10 @@ class Line:
                 step = np.linalg.solve(full, right)
             except np.linalg.LinAlgError:
                 return None
-            if not np.all(np.isfinite(step)):
+            if not np.isfinite(step).all():
                 return None
             x = x + step
-            now = float(np.max(np.abs(step))) / (1.0 + float(np.max(np.abs(x))))
+            now = float(np.abs(step).max()) / (1.0 + float(np.abs(x).max()))
             if now < _ROUNDING or (now < _LAST and now >= 0.5 * before):
                 joints, vector = self._split(x)
                 done = Status.CONVERGED

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.kept import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
 from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
@@ -30,23 +30,23 @@ def join(orbit: Orbit, settings: Settings, behind: Side, ahead: Side) -> Branch:
     """Return one branch from the two sides of its start."""
     shift = behind.position
     back = [_turned(b, shift) for b in reversed(behind.bifurcations)]
-    front = [replace(b, position=shift + b.position) for b in ahead.bifurcations]
+    front = [altered(b, position=shift + b.position) for b in ahead.bifurcations]
     first, last = behind.end, ahead.end
     if first.bifurcation is not None:
-        first = replace(first, bifurcation=_turned(first.bifurcation, shift))
+        first = altered(first, bifurcation=_turned(first.bifurcation, shift))
     if last.bifurcation is not None:
-        moved = replace(last.bifurcation, position=shift + last.bifurcation.position)
-        last = replace(last, bifurcation=moved)
+        moved = altered(last.bifurcation, position=shift + last.bifurcation.position)
+        last = altered(last, bifurcation=moved)
     return _branch(orbit, settings, behind, ahead, (*back, *front), (first, last))
 
 
 def _turned(b: Bifurcation, shift: float) -> Bifurcation:
     """Return an event of a side that the branch runs through backwards."""
-    turned = replace(b, position=shift - b.position)
+    turned = altered(b, position=shift - b.position)
     if b.kind is not Kind.SN:
         return turned
     # at a fold both sides lie at the same values: only the order of the branch tells them apart
-    return replace(turned, stable_before=b.stable_after, stable_after=b.stable_before)
+    return altered(turned, stable_before=b.stable_after, stable_after=b.stable_before)
 
 
 def assemble(
@@ -64,8 +64,8 @@ def _told_upward(first: End, values: FloatArray) -> End:
         return first
     if len(values) < 2 or values[1] >= values[0]:
         return first
-    upward = replace(b, stable_before=b.stable_after, stable_after=None)
-    return replace(first, bifurcation=upward)
+    upward = altered(b, stable_before=b.stable_after, stable_after=None)
+    return altered(first, bifurcation=upward)
 
 
 def _branch(
@@ -104,7 +104,7 @@ def _branch(
     _renew_ends(branch)
     branch = _without_critical_ends(branch, settings)
     if continua := tuple(continua_of(branch)):
-        branch = replace(branch, notes=(*branch.notes, *continua))
+        branch = altered(branch, notes=(*branch.notes, *continua))
     return with_openings(with_families(branch, settings), settings)
 
 
@@ -155,7 +155,7 @@ def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
                 idle.add(id(b))
     if not idle:
         return branch
-    return replace(branch, bifurcations=tuple(b for b in branch.bifurcations if id(b) not in idle))
+    return altered(branch, bifurcations=tuple(b for b in branch.bifurcations if id(b) not in idle))
 
 
 def _renew_ends(branch: Branch) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.extras import need_flint
+from contfric.base.kept import altered
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
 from contfric.continuation.events import Bifurcation, End, Kind
@@ -271,7 +272,7 @@ class Branch(Shown):
         if not self.model.autonomous:
             joints[:, :, 0] += (symmetry.fraction * self.period / self.system.periods)[:, None]
         images = {id(b): b.mirror() for b in self._all_bifurcations()}
-        return replace(
+        return altered(
             self,
             system=system,
             joints=joints,
@@ -393,4 +394,4 @@ def _padded(rows: list[FloatArray]) -> FloatArray:
 def _mirror_end(end: End, images: dict[int, Bifurcation]) -> End:
     if end.bifurcation is None:
         return end
-    return replace(end, bifurcation=images[id(end.bifurcation)])
+    return altered(end, bifurcation=images[id(end.bifurcation)])

@@ -116,7 +116,7 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
     for gradient, slope in _gradients(orbit, active, least, parted):
         on_inner = gradient[1:-1].ravel()
         along = free @ on_inner
-        bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.max(np.abs(on_inner), initial=0.0)))
+        bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.abs(on_inner).max(initial=0.0)))
         if bent.size:  # it is of the order of a freedom, which it gives its sign
             for k in map(int, bent):
                 free[k] *= np.copysign(1.0, along[k]) if not signed[k] else 1.0
@@ -162,7 +162,7 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
 
     Times move by the step; a direction is scaled so that its largest component is 1.
     """
-    direction = direction / np.max(np.abs(direction))
+    direction = direction / np.abs(direction).max()
     sizes = []
     found = []
     for step in (_STEP, 0.5 * _STEP):
@@ -301,7 +301,7 @@ def possible(
     values = np.einsum("sjgk,sjk->sjg", picked, local)
     scale = np.einsum("sjgk,sjk->sjg", np.abs(picked), np.abs(local)) * _UNDECIDED
     q = solved[:, :, m:] * signed[chosen]
-    slack = _UNDECIDED * np.max(np.abs(solved), axis=(1, 2))[:, None, None]
+    slack = _UNDECIDED * np.abs(solved).max(axis=(1, 2))[:, None, None]
     fine = ~singular
     above = np.all(values >= -scale, axis=(1, 2)) & np.all(q >= -slack, axis=(1, 2))
     below = np.all(values <= scale, axis=(1, 2)) & np.all(q <= slack, axis=(1, 2))

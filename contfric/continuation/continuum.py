@@ -67,12 +67,12 @@ def in_continuum(orbit: Orbit, active: int) -> bool:
     joints = orbit.joints + _BESIDE * away * np.sqrt(len(away)) / np.linalg.norm(away)
     for _ in range(_STEPS):
         residual, by_joints, _ = equations_at(orbit.system, joints, orbit.vector)
-        if not np.all(np.isfinite(by_joints)):
+        if not np.isfinite(by_joints).all():
             return False
         change = np.linalg.lstsq(by_joints, -residual, rcond=LEVEL)[0]
         joints = joints + change.reshape(joints.shape)
     residual, _, _ = equations_at(orbit.system, joints, orbit.vector)
-    if not np.max(np.abs(residual)) < _SOLVED:
+    if not np.abs(residual).max() < _SOLVED:
         return False
     gap = np.linalg.norm(joints - orbit.joints) / np.sqrt(len(joints))
     there, _ = null_space(orbit.system, joints, orbit.vector, active)
@@ -85,7 +85,7 @@ def is_continuum(branch: Branch) -> bool:
     Its folds are asked, too: the points of a short bridge may all be near its ends, at one value.
     """
     _, values, _ = branch.nodes
-    largest = float(np.max(np.abs(values)))
+    largest = float(np.abs(values).max())
     return bool(branch.arc[-1] > _LENGTH and np.ptp(values) < _ONE_VALUE * (1.0 + largest))
 
 

@@ -40,9 +40,9 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
     """
     rows, last = side.rows, side.last
     first = max(0, last - fresh)
-    steps = np.diff(rows.arc[first : last + 1])
+    steps = rows.arc[first + 1 : last + 1] - rows.arc[first:last]
     short = (steps < _STEP) & (rows.arc[first:last] - side.first.arc > _START)
-    if not np.any(short):
+    if not short.any():
         return False
     z, w = rows.tangents[first : last + 1], rows.directions[first : last + 1, 0]
     along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * settings.scale

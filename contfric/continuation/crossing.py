@@ -115,7 +115,7 @@ def crossing_near(orbit: Orbit, settings: Settings, within: float) -> Crossing |
     if directions is None:
         return None
     joints, vector = problem.split(x)
-    found = Orbit(system, joints, vector, float(np.max(np.abs(problem.at(x)[0]))), Status.CONVERGED)
+    found = Orbit(system, joints, vector, float(np.abs(problem.at(x)[0]).max()), Status.CONVERGED)
     return Crossing(found, directions)
 
 
@@ -171,7 +171,7 @@ class _ChainProblem:
 def _moore(problem: _ChainProblem, x: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """Return unknowns and left null vector at the branch point near a point, or None."""
     residual, jacobian = problem.at(x)
-    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+    if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
         return None
     left, values, _ = np.linalg.svd(jacobian)
     if not values[-1] < _REGULAR * values[0]:
@@ -187,14 +187,14 @@ def _moore(problem: _ChainProblem, x: FloatArray) -> tuple[FloatArray, FloatArra
         full[size:-1, size + 1 : -1] = jacobian.T
         full[-1, size + 1 : -1] = 2.0 * psi
         right = -np.concatenate([residual + beta * psi, psi @ jacobian, [psi @ psi - 1.0]])
-        if not np.all(np.isfinite(full)):
+        if not np.isfinite(full).all():
             return None
         try:
             step = np.linalg.solve(full, right)
         except np.linalg.LinAlgError:
             return None
         x, psi, beta = x + step[: size + 1], psi + step[size + 1 : -1], beta + float(step[-1])
-        moved = float(np.max(np.abs(step[: size + 1])))
+        moved = float(np.abs(step[: size + 1]).max())
         rises += moved > before
         if not moved < 1.0 or rises == _MOST_RISES:
             return None

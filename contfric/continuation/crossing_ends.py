@@ -24,7 +24,7 @@ def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale
     for tip, inner in ((0, 1), (-1, -2)):
         end = _aligned(branch, tip, tip, orbit)
         near = _aligned(branch, inner, tip, orbit)
-        if end is None or near is None or np.max(np.abs(end - orbit.joints)) > _SAME:
+        if end is None or near is None or np.abs(end - orbit.joints).max() > _SAME:
             continue
         slope = float(branch.values[inner] - branch.values[tip])
         if direction.cosine(near - end, slope, scale) > _ALONG:
@@ -51,7 +51,7 @@ def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray
             shift = unit * round(float(turned[0][0, 0] - orbit.joints[0, 0]) / unit)
         for joints in turned:
             joints[:, 0] -= shift
-        gap = float(np.max(np.abs(turned[0] - orbit.joints)))
+        gap = float(np.abs(turned[0] - orbit.joints).max())
         if best is None or gap < best[0]:
             best = gap, turned[1]
     return None if best is None else best[1]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.along_curve import Line
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status
@@ -51,7 +51,7 @@ def solved_at_vertex(orbit: Orbit, active: int) -> Orbit | None:
 
 
 def _is_near(orbit: Orbit, other: Orbit) -> bool:
-    return float(np.max(np.abs(orbit.joints - other.joints))) < NEARLY
+    return float(np.abs(orbit.joints - other.joints).max()) < NEARLY
 
 
 def opening(orbit: Orbit) -> float:
@@ -61,14 +61,11 @@ def opening(orbit: Orbit) -> float:
     P - Q K against the largest, with the sign of the determinant. Other than the multiplier -1 that it
     stands for, it is defined also on a bridge. Nan for an orbit that Newton has lost.
     """
-    if not (orbit.converged and np.all(np.isfinite(orbit.joints))):
+    if not (orbit.converged and np.isfinite(orbit.joints).all()):
         return float(np.nan)
     p, q = pencil_of_turn(orbit.system, orbit.joints, orbit.vector)
-    close = np.eye(len(p))
-    close[0, 0] = 0.0 if orbit.model.autonomous else 1.0  # a turn may take another time
-    close[1:, 1:] = orbit.system.layout.closing
-    left = p - q @ close
-    if not np.all(np.isfinite(left)):  # an orbit that Newton has lost
+    left = p - q @ orbit.system.closing
+    if not np.isfinite(left).all():  # an orbit that Newton has lost
         return np.nan
     values = np.linalg.svd(left, compute_uv=False)
     return float(np.copysign(values[-1] / values[0], np.linalg.det(left)))
@@ -85,7 +82,7 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     for beside in _BESIDE:
         offset = beside * (1.0 + abs(value))
         sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
-        if np.all(np.isfinite(sides)) and min(np.abs(sides)) > _ROUNDING:
+        if np.isfinite(sides).all() and min(np.abs(sides)) > _ROUNDING:
             told = True
             if sides[0] * sides[1] < 0.0:
                 return True
@@ -146,7 +143,7 @@ def _refined_along(orbit: Orbit, active: int) -> Orbit | None:
     opens = opening(start)
     if not abs(opens) < _OPENS:
         return None
-    lost = replace(start, status=Status.NOT_CONVERGED)
+    lost = altered(start, status=Status.NOT_CONVERGED)
     found, least = _by_secants(start, opens, lambda shift, _: line.at(shift) or lost, 1.0)
     return found if _is_near(found, orbit) and least < _LOCATED else None
 
@@ -175,7 +172,7 @@ def _by_secants(
         if not np.isfinite(open_here) or open_before == open_here:
             break
         there = here - open_here * (here - before) / (open_here - open_before)
-        if np.all(np.isfinite(ends)) and not min(ends) < there < max(ends):
+        if np.isfinite(ends).all() and not min(ends) < there < max(ends):
             there = 0.5 * (ends[0] + ends[1])
         if not abs(there) < _FAR * size:
             break
@@ -194,4 +191,4 @@ def moved(orbit: Orbit, active: int, value: float) -> Orbit:
     """Return an orbit solved at another value of a parameter; its status says whether it is."""
     vector = orbit.vector.copy()
     vector[active] = value
-    return refine(replace(orbit, vector=vector), damped=False)
+    return refine(altered(orbit, vector=vector), damped=False)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
@@ -44,8 +47,8 @@ def is_point(orbit: Orbit) -> bool:
     if not orbit.model.autonomous:
         return False
     states = orbit.joints[:, 1:]
-    size = np.max(np.abs(states - states[0])) + np.max(np.abs(orbit.ends[-1, 1:] - states[0]))
-    least = _NO_SIZE * (1.0 + np.max(np.abs(states)))
+    size = np.abs(states - states[0]).max() + np.abs(orbit.ends[-1, 1:] - states[0]).max()
+    least = _NO_SIZE * (1.0 + np.abs(states).max())
     return bool(size < least) and orbit.x_max - orbit.x_min < least
 
 
@@ -54,7 +57,7 @@ def never_leaves(orbit: Orbit) -> bool:
     model = orbit.model
     if not model.chatter_by_mode:
         return False
-    least = _NO_HEIGHT * (1.0 + float(np.max(np.abs(orbit.joints[:, 1:]))))
+    least = _NO_HEIGHT * (1.0 + float(np.abs(orbit.joints[:, 1:]).max()))
     for own in {model.chatter_by_mode[m] for m, _ in orbit.itinerary if m in model.chatter_by_mode}:
         gap, highest = model.surface_by_name[own.surface].observable, 0.0
         level = orbit.flow.level(own.surface)
@@ -108,11 +111,11 @@ def _to_equilibrium(orbit: Orbit, mode: str, joint: FloatArray, lasts: float) ->
     moved = orbit.flow.state(mode, time, state, lasts) - state
     slopes = orbit.flow.jacobian(mode, time, state, lasts)[:, 1 : 1 + len(state)]
     slopes -= np.eye(len(state))
-    if not (np.all(np.isfinite(moved)) and np.all(np.isfinite(slopes))):
+    if not (np.isfinite(moved).all() and np.isfinite(slopes).all()):
         return np.inf
     step = np.linalg.lstsq(slopes, -moved, rcond=None)[0]
-    reached = np.max(np.abs(moved + slopes @ step)) <= 0.5 * np.max(np.abs(moved))
-    return float(np.max(np.abs(step))) if reached else np.inf
+    reached = np.abs(moved + slopes @ step).max() <= 0.5 * np.abs(moved).max()
+    return float(np.abs(step).max()) if reached else np.inf
 
 
 def endless(orbit: Orbit) -> End | None:
@@ -150,7 +153,9 @@ def ends_at(
         side.put_tip(at_vertex(point, bifurcation.orbit, active))
     else:
         side.put_tip(point)
-    message = _end_message(bifurcation) if ends.name == bifurcation.kind.name else ""
+    message: str | Callable[[], str] = ""
+    if ends.name == bifurcation.kind.name:  # most are never read
+        message = partial(_end_message, bifurcation)
     vertex = ends is EndReason.BP and bifurcation.kind is Kind.BP
     if vertex and bifurcation.orbit.system.half == orbit.system.half:
         message = CROSSED
@@ -243,5 +248,5 @@ def grows(side: Side, settings: Settings) -> bool:
     values, last = side.rows.w[: side.last + 1, 0], side.last
     if np.ptp(values) > _AT_RESONANCE * settings.width:
         return False
-    before, now = (float(np.max(np.abs(side.rows.joints[k, :, 1:]))) for k in (0, last))
+    before, now = (float(np.abs(side.rows.joints[k, :, 1:]).max()) for k in (0, last))
     return now > _LARGE and now > _GROWS * before

@@ -6,12 +6,12 @@ Which sliding event a margin that reaches zero is: :mod:`contfric.continuation.k
 from __future__ import annotations
 
 from collections.abc import Callable, Set
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from enum import Enum
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.base.extras import need_flint
+from contfric.base.kept import altered
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.errors import ParameterError, did_you_mean
@@ -21,7 +21,11 @@ from contfric.orbit.slides import Outline
 from contfric.orbit.system import EventFunction
 from contfric.remember.stored import made_of
 
+if not TYPE_CHECKING:
+    from contfric.base.kept import cached_property
 if TYPE_CHECKING:
+    from functools import cached_property
+
     from contfric.certify.events import EventCertificate
 
 
@@ -287,9 +291,9 @@ class Bifurcation(MeasuredEvent):
         symmetry = self.orbit.model.symmetry
         assert symmetry is not None
         tests = tuple(
-            replace(t, surface=symmetry.surfaces.get(t.surface, t.surface)) for t in self.tests
+            altered(t, surface=symmetry.surfaces.get(t.surface, t.surface)) for t in self.tests
         )
-        return replace(self, orbit=self.orbit.mirror(), tests=tests)
+        return altered(self, orbit=self.orbit.mirror(), tests=tests)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{k}={v:.12g}" for k, v in self.params.items())
@@ -298,7 +302,7 @@ class Bifurcation(MeasuredEvent):
 
 def _parts(bifurcation: Bifurcation) -> tuple[object, ...]:
     """Return what an event is stored as: with its accuracy, and not with what computes that."""
-    plain = replace(bifurcation, bound=bifurcation.accuracy)
+    plain = altered(bifurcation, bound=bifurcation.accuracy)
     return tuple(getattr(plain, f.name) for f in fields(plain))
 
 
@@ -324,12 +328,31 @@ def _is_rested_on(model: Model, surface: str) -> bool:
     return model.rests_on(surface)
 
 
+class Told:
+    """A text of a data class, given as it is or as what returns it, which is called when it is asked for."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type) -> str:
+        """Return the text; the default of the class is none."""
+        if instance is None:
+            return ""
+        own = vars(instance)
+        if callable(own[self._name]):
+            own[self._name] = own[self._name]()
+        return str(own[self._name])
+
+    def __set__(self, instance: object, text: str | Callable[[], str]) -> None:
+        vars(instance)[self._name] = text
+
+
 @dataclass(frozen=True, eq=False)
 class End:
     """Why a branch ends, with the event if there is one."""
 
     reason: EndReason
-    message: str = ""
+    message: Told = Told()
     bifurcation: Bifurcation | None = field(default=None, repr=False)
 
     def __str__(self) -> str:

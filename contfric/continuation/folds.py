@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.crossing import crossing_between
 from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Bifurcation, Kind
@@ -78,7 +77,7 @@ def _split_between(
     if split is None:
         return None
     far = after.arc - before.arc > SHORTEST_OVERSHOOT
-    return replace(split, bound=ROUGH), replace(before, lost=far)
+    return altered(split, bound=ROUGH), altered(before, lost=far)
 
 
 def fold_at(
@@ -157,7 +156,7 @@ def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
         return False
     if not settings.stability:
         return True
-    return all(float(np.min(np.abs(point.mu - 1.0))) < _MARGINAL for point in (before, after))
+    return all(float(np.abs(point.mu - 1.0).min()) < _MARGINAL for point in (before, after))
 
 
 def _turns(before: Point, point: Point, after: Point, known: float) -> bool:
@@ -214,7 +213,7 @@ def not_located(
     """
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)
-    return replace(bifurcation, located=False, bound=2.0 * bifurcation.accuracy), before
+    return altered(bifurcation, located=False, bound=2.0 * bifurcation.accuracy), before
 
 
 def _fold(orbit: Orbit, before: Point, after: Point, point: Point, settings: Settings) -> Located:
@@ -230,5 +229,5 @@ def _fold(orbit: Orbit, before: Point, after: Point, point: Point, settings: Set
         kind, here = Kind.SN, simpler_fold(here, settings) or here
     found = bifurcation_at(kind, here, before, after, point, settings)
     if kind is not Kind.SN and not opens_through(here, active):
-        found = replace(found, bound=ROUGH)
+        found = altered(found, bound=ROUGH)
     return found, point

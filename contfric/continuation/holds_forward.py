@@ -59,7 +59,7 @@ def with_holds_forward(
     solved = first_point(replace(here, joints=joints), settings, way, slope)
     if solved is None:
         return point, here, first
-    moved = float(np.max(np.abs(solved.joints - here.joints)))
+    moved = float(np.abs(solved.joints - here.joints).max())
     there = solved.orbit(here.system, here.vector, here.model.index_of(settings.parameter))
     last = float(np.min(there.ends[:, 0] - there.cycle[:, 0]))
     if moved > _NEAR * float(np.max(-lasts[back])) or last < 0.0 or not there.admissible:

@@ -19,10 +19,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.locations import TANGENTIAL, locations_of, normal_location
@@ -41,7 +42,7 @@ from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
 from contfric.orbit.system import EventFunction, Itinerary, Margin, build_system
-from contfric.signature.edits import apply_edit, edited_pieces
+from contfric.signature.edits import edited_pieces, walked
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
 _VANISHES = 1e-9
@@ -144,7 +145,7 @@ def _moves(orbit: Orbit) -> bool:
         if mode not in resting and last > SHORT * time_unit(orbit):
             start = float(begin[0]), begin[1:]
             moved = [orbit.flow.state(mode, *start, float(last * share)) for share in _SHARES]
-            if np.max(np.abs(np.array(moved) - begin[1:])) > SAME_SOLUTION:
+            if np.abs(np.array(moved) - begin[1:]).max() > SAME_SOLUTION:
                 return True
     return False
 
@@ -159,7 +160,7 @@ def _started(orbit: Orbit, unit: Unit, least: float) -> tuple[_Collection, froze
         return collection, collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
     except NotationError:
         collection = _Collection(
-            replace(unit, periods=orbit.periods, half=False, duration=orbit.period), least
+            altered(unit, periods=orbit.periods, half=False, duration=orbit.period), least
         )
         return collection, collection.take(orbit, np.zeros(len(orbit.itinerary)), "")
 
@@ -234,8 +235,9 @@ class _Collection:
 def vanishing(orbit: Orbit, least: float) -> list[tuple[EventFunction, Kind]]:
     """Return the locations of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
     found: dict[EventFunction, Kind] = {}
-    for test, value in zip(orbit.system.tests, orbit.margins, strict=True):
-        if not abs(value) < (least if is_linear(test, orbit) else max(least, TANGENTIAL)):
+    widest, margins = max(least, TANGENTIAL), orbit.margins.tolist()
+    for test, value in zip(orbit.system.tests, margins, strict=True):
+        if not (abs(value) < widest and (abs(value) < least or not is_linear(test, orbit))):
             continue
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:
@@ -286,8 +288,10 @@ def edited_whole(
         edit |= outcome.edit
         joints |= outcome.joints
         speeds |= outcome.away
-    origins = [origin for origin, _ in edited_pieces(orbit.itinerary, edit)]
-    itinerary = _crossing_as_before(orbit, apply_edit(orbit.itinerary, edit, orbit.model), origins)
+    pieces = edited_pieces(orbit.itinerary, edit)
+    origins = [origin for origin, _ in pieces]
+    itinerary = walked(orbit.itinerary, pieces, orbit.model)
+    itinerary = _crossing_as_before(orbit, itinerary, origins)
     starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
     kept = np.zeros(len(orbit.itinerary)) if away is None else away
     moves = np.array([speeds.get(o, kept[o[0]] if o[1] < 0 else 0.0) for o in origins])
@@ -301,7 +305,7 @@ def edited_whole(
         system = build_system(orbit.model, itinerary, orbit.periods)
     except ValueError as error:
         raise NotationError(str(error)) from None
-    return replace(orbit, system=system, joints=starts, status=Status.CONVERGED), moves
+    return altered(orbit, system=system, joints=starts, status=Status.CONVERGED), moves
 
 
 def _crossing_as_before(
@@ -312,6 +316,8 @@ def _crossing_as_before(
     A segment that takes over the exit of others takes over the part of the mode, too, that ended there.
     """
     model = orbit.model
+    if not model.joined:
+        return itinerary
     pairs = list(named_by_ends(itinerary, model))
     for k, (mode, exit_) in enumerate(pairs):
         following, put_in = origins[(k + 1) % len(origins)]

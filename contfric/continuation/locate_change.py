@@ -126,6 +126,6 @@ def locate_value(
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = target
     exact = refine(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
-    if exact.converged and np.max(np.abs(exact.joints - found.joints)) < 1e-6:
+    if exact.converged and np.abs(exact.joints - found.joints).max() < 1e-6:
         found.joints, found.w = exact.joints, np.array([target])
     return found

@@ -58,7 +58,7 @@ def _moved(
     a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
     b[-1] = b[-1] @ close
     weights = _weights(a, b, c[:, :, active], row, wanted)
-    if weights is None or not np.all(np.isfinite(weights)):
+    if weights is None or not np.isfinite(weights).all():
         return None
     errors = np.abs(residual) + _rounding(orbit)
     return float(np.abs(weights[:-1]) @ errors), abs(float(weights[-1]))
@@ -66,7 +66,7 @@ def _moved(
 
 def _rounding(orbit: Orbit) -> FloatArray:
     """Return the rounding of every equation of a chain, shape (N m,)."""
-    size = np.max(np.abs(orbit.joints), axis=1)
+    size = np.abs(orbit.joints).max(axis=1)
     size = 1.0 + np.maximum(size, np.append(size[1:], size[0]))
     unit = UNITS * np.finfo(float).eps + orbit.model.rounding
     return np.repeat(unit * size, orbit.joints.shape[1])

@@ -18,10 +18,9 @@ there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point, point_before
 from contfric.models.definition import FloatArray
@@ -68,7 +67,7 @@ def last_told(
             return told
     if not np.isfinite(beyond.tests[-EXTRA:]).all():
         return None
-    if not np.max(np.abs(beyond.mu), initial=0.0) > _INFINITE:
+    if not np.abs(beyond.mu).max(initial=0.0) > _INFINITE:
         return beyond
     return _if_finite(point_before(here, beyond, SAME_LOCATION, settings))
 
@@ -79,7 +78,7 @@ def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) ->
     At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
     """
     at_event = np.min(before.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION
-    pole = at_event and np.max(np.abs(before.mu), initial=0.0) > 1.0 / _LOCATED
+    pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
     if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
         return before
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
@@ -136,10 +135,10 @@ def _point_at(
     w, direction = along(before.w, event.w, before.direction)
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] = w[0]
-    predicted = replace(orbit, joints=joints, vector=vector)
+    predicted = altered(orbit, joints=joints, vector=vector)
     point = _if_finite(first_point(predicted, settings, tangent, float(direction[0])))
     if point is None:
         return None
     square = float(np.sum((point.joints - joints) ** 2)) / len(joints)
     miss = np.sqrt(square + float((point.w - w) @ (point.w - w)) * settings.scale)
-    return replace(point, arc=event.arc - back) if miss < _MISS * back else None
+    return altered(point, arc=event.arc - back) if miss < _MISS * back else None

@@ -19,7 +19,7 @@ from contfric.continuation.doubling_point import location_error, opening, refine
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import Settings
 from contfric.continuation.side import first_point
-from contfric.orbit.index import opening_sign
+from contfric.orbit.index import opening_sign, opening_signs
 from contfric.orbit.orbit import Orbit
 
 #: Halvings of the step in which an opening is seen: to far below where secants take over.
@@ -34,7 +34,7 @@ def with_openings(branch: Branch, settings: Settings) -> Branch:
         return branch
     if not (branch.system.half or settings.copies > 1):
         return branch
-    signs = [opening_sign(orbit) for orbit in branch]
+    signs = opening_signs(branch[:])
     found = []
     for k, (a, b) in enumerate(pairwise(signs)):
         if a is not None and b is not None and a * b < 0:

@@ -37,7 +37,7 @@ def with_families(branch: Branch, settings: Settings) -> Branch:
     mu = branch.turn_multipliers
     if mu is None or not mu.size or not branch.system.half or branch.bridge or len(branch) < 3:
         return branch
-    away = np.min(np.abs(mu + 1.0), axis=1)
+    away = np.abs(mu + 1.0).min(axis=1)
     near = (away[1:-1] < _TOUCHES) & (away[1:-1] <= away[:-2]) & (away[1:-1] < away[2:])
     events = [_passed(branch, mu, *three) for three in _told_around(branch, away, near)]
     found = [b for b in events if b is not None and not _is_listed(branch, b, settings)]
@@ -110,7 +110,7 @@ def _passed(
     """
     three = [low, k, high]
     sides = np.min((mu[three] + 1.0).real, axis=1)
-    away = np.min(np.abs(mu[three] + 1.0), axis=1)
+    away = np.abs(mu[three] + 1.0).min(axis=1)
     if not (sides[0] * sides[2] > 0.0 and _may_touch(away, branch.arc[three])):
         return None
     active = branch.model.index_of(branch.parameter)

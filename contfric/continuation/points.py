@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -139,10 +140,16 @@ class Point:
         return float(self.direction[0])
 
     def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
-        """Return the point of a branch as an orbit."""
+        """Return the point of a branch as an orbit; the same one for the same question."""
+        asked, own = (system, vector, active, self.joints, self.w), vars(self)
+        last: tuple[tuple[object, ...], Orbit] | None = own.get("_orbit")
+        if last is not None and all(map(operator.is_, asked, last[0])):
+            return last[1]
         full = vector.copy()
-        full[active] = self.value
-        return Orbit(system, self.joints.copy(), full, 0.0)
+        full[active] = self.w[0]
+        found = Orbit(system, self.joints.copy(), full, 0.0)
+        own["_orbit"] = asked, found
+        return found
 
     def as_start(self) -> tuple[FloatArray, FloatArray]:
         """Return (joints, tangent) and (parameters, direction) as the march takes them."""
@@ -220,12 +227,22 @@ class PointRows:
         """Return the arrays up to a row, as the march takes them."""
         from contfric.continuation.geometry import Points
 
-        arrays = vars(self).values()
-        return Points(*(arrays if stop is None else (a[:stop] for a in arrays)))
+        if stop is None:
+            return Points(*vars(self).values())
+        return Points(
+            self.joints[:stop],
+            self.w[:stop],
+            self.tangents[:stop],
+            self.directions[:stop],
+            self.arc[:stop],
+            self.tests[:stop],
+            self.labels[:stop],
+            self.mu[:stop],
+        )
 
     def first(self, count: int) -> PointRows:
         """Return the first rows."""
-        return PointRows(*(array[:count].copy() for array in vars(self).values()))
+        return PointRows(*[array[:count].copy() for array in vars(self).values()])
 
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""
@@ -238,6 +255,19 @@ class PointRows:
             self.labels[k].copy(),
             self.mu[k].copy(),
             float(self.arc[k]),
+        )
+
+    def only(self) -> Point:
+        """Return the first row as a point that shares the arrays: of rows that nothing else is written to."""
+        return Point(
+            self.joints[0],
+            self.w[0],
+            self.tangents[0],
+            self.directions[0],
+            self.tests[0],
+            self.labels[0],
+            self.mu[0],
+            float(self.arc[0]),
         )
 
     def points(self, start: int, stop: int) -> list[Point]:

@@ -65,7 +65,7 @@ def sampled(
     if release.surfaces is None:
         return None
     jumps = release.jumps(grid)
-    if not np.all(np.isfinite(jumps)):
+    if not np.isfinite(jumps).all():
         return None
     sides = _sides(release, grid, jumps)
     if sides is None:
@@ -78,7 +78,7 @@ def sampled(
         images, heights = release.over(letter, end, _NODES, grid, jumps)
         above = heights[:, 1:] * release.sign(letter)
         one_jump = np.all(np.diff(above, axis=1) > 0.0) and np.all(above > 0.0)
-        if not one_jump or not np.all(np.isfinite(images)):
+        if not one_jump or not np.isfinite(images).all():
             return None
         if images.min() < min(ends.values()) or images.max() > max(ends.values()):
             return None
@@ -108,7 +108,7 @@ def _interval(
                 for k, end in ends.items()
             ]
         )
-        if not np.all(np.isfinite(images)):
+        if not np.isfinite(images).all():
             return None
         wanted = {k: side * float(np.max(side * images)) for k, side in sides.items()}
         if all(abs(ends[k]) >= sides[k] * wanted[k] for k in ends):

@@ -6,13 +6,15 @@ parameter, arclength, labels, multipliers) is copied out of the rows when they a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import threading
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.kept import altered
 from contfric.base.tally import tally
 from contfric.continuation.events import Bifurcation, End
 from contfric.continuation.points import SMALLEST_STEP, Point, PointRows, Settings
@@ -252,14 +254,29 @@ def march_options(step: float, largest: float, accuracy: float) -> FloatArray:
     return np.array([min(step, largest), largest, SMALLEST_STEP, _GIVES_WAY, 1.0, 0.0, accuracy])
 
 
+class _LastProblem(threading.local):
+    """The branch last at work in this thread: its pieces and its events ask for it again and again."""
+
+    orbit: Orbit | None = None
+    settings: Settings | None = None
+    problem: BranchProblem
+
+
+_LAST = _LastProblem()
+
+
 def branch_problem(orbit: Orbit, settings: Settings) -> BranchProblem:
     """Return the branch of an orbit as the compiled engine takes it."""
     from contfric.continuation.steps import BranchProblem
 
-    system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
-    scale = np.array([settings.scale])
-    functions, layout = system.functions(), system.layout
-    return BranchProblem(functions, layout, orbit.vector, which, scale, settings.stability)
+    if _LAST.orbit is not orbit or _LAST.settings is not settings:
+        system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
+        scale, functions = np.array([settings.scale]), system.functions()
+        _LAST.problem = BranchProblem(
+            functions, system.layout, orbit.vector, which, scale, settings.stability
+        )
+        _LAST.orbit, _LAST.settings = orbit, settings
+    return _LAST.problem
 
 
 def first_point(
@@ -279,16 +296,16 @@ def first_point(
     rows = PointRows.empty(orbit.system, 1)
     rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[orbit.model.index_of(settings.parameter)]
     rows.tangents[0], rows.directions[0] = direction, slope
-    options, start = march_options(0.0, settings.largest, ALONG), rows.point(0).as_start()
-    course = Course(options, settings.box, -1, *start, 0, rows.arrays(1), tally())
+    options, start = march_options(0.0, settings.largest, ALONG), rows.only().as_start()
+    course = Course(options, settings.box, -1, *start, 0, rows.arrays(), tally())
     why, _, _ = march(branch_problem(orbit, settings), course)
-    return None if why == BROKEN else rows.point(0)
+    return None if why == BROKEN else rows.only()
 
 
 def point_before(here: Orbit, point: Point, back: float, settings: Settings) -> Point | None:
     """Solve for the point of a branch this far (in arclength) before one; ``here`` is the orbit at that."""
     vector = here.vector.copy()
     vector[here.model.index_of(settings.parameter)] -= back * point.slope
-    moved = replace(here, joints=here.joints - back * point.tangent, vector=vector)
+    moved = altered(here, joints=here.joints - back * point.tangent, vector=vector)
     found = first_point(moved, settings, point.tangent, point.slope)
-    return None if found is None else replace(found, arc=point.arc - back)
+    return None if found is None else altered(found, arc=point.arc - back)

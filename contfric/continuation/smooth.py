@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.continuum import LEVEL
 from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Bifurcation, Kind
@@ -163,7 +162,7 @@ def _at_multiplier(
         return []  # the fold there says what it is; near it chi(1) is rounding
     event = bifurcation_at(kind, here, before, beyond, point, settings)
     if column == CHI_MINUS and not opens_through(here, active):
-        event = replace(event, bound=ROUGH)
+        event = altered(event, bound=ROUGH)
     return [(event, point)]
 
 
@@ -194,7 +193,7 @@ def _overshot(
         return not_located(orbit, kind, before, beyond, settings)
     here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
     found = bifurcation_at(kind, here, before, beyond, before, settings)
-    return found, replace(before, lost=True)
+    return found, altered(before, lost=True)
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:

@@ -46,7 +46,7 @@ def _multipliers(here: Orbit) -> str:
     if here.system.holds:  # a bridge has none
         return stalled
     mu = here.turn_multipliers
-    if not np.all(np.isfinite(mu)):
+    if not np.isfinite(mu).all():
         return f"{stalled}; a multiplier is infinite: an exit is tangential there"
     nearest = complex(mu[np.argmin(np.abs(mu - 1.0))])
     text = f"{nearest.real:.6g}" + (f"{nearest.imag:+.6g}i" if nearest.imag else "")

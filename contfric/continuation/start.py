@@ -55,8 +55,8 @@ def _as_symmetric(orbit: Orbit) -> Orbit:
     if part is None or orbit.system.holds:
         return orbit
     solved = refine(part)
-    away = np.min(np.abs(orbit.turn_multipliers - 1.0), initial=1.0)
-    gap = np.max(np.abs(solved.cycle - orbit.joints)) if solved.converged else np.inf
+    away = np.abs(orbit.turn_multipliers - 1.0).min(initial=1.0)
+    gap = np.abs(solved.cycle - orbit.joints).max() if solved.converged else np.inf
     return solved if gap * away < _ROUNDING else orbit
 
 

@@ -216,8 +216,8 @@ def thrown_at(orbit: Orbit, test: EventFunction) -> str:
         if all(orbit.model.domain_by_name[name].mode != whole for name in after):
             return test.surface
     image = orbit.flow.reset(test.surface, float(touch[0]), touch[1:])
-    moved = np.max(np.abs(image - touch[1:]))
-    return test.surface if moved > _PASSED * (1.0 + np.max(np.abs(touch[1:]))) else ""
+    moved = np.abs(image - touch[1:]).max()
+    return test.surface if moved > _PASSED * (1.0 + np.abs(touch[1:]).max()) else ""
 
 
 def _kicked_again(orbit: Orbit, test: EventFunction) -> str:

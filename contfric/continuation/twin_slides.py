@@ -70,7 +70,7 @@ def nearer_than_twins(
 def _lasts(system: System, point: Point, orbit: Orbit) -> FloatArray:
     """Return how long the segments last that an orbit is solved with, shape (N,)."""
     times = point.joints[:, 0]
-    lasts: FloatArray = np.diff(times, append=times[0] + orbit.turn)
+    lasts: FloatArray = np.append(times[1:], times[0] + orbit.turn) - times
     return lasts
 
 

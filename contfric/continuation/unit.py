@@ -8,10 +8,10 @@ is cut at the start of a slide of some length, which every itinerary has; each i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from contfric.base.kept import cached_property
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked

@@ -164,7 +164,7 @@ def _next_to(whole: Orbit, active: int, within: float) -> VerticalFamily | None:
     if joints is None:
         return None
     residual, _, _ = equations_at(whole.system, joints, whole.vector, False)
-    if not np.max(np.abs(residual)) < _NEAR + within**2:  # it is c b^2 near an orbit of a family
+    if not np.abs(residual).max() < _NEAR + within**2:  # it is c b^2 near an orbit of a family
         return None
     for distance in distances:
         moved = replace(whole, joints=whole.joints + distance * along)
@@ -197,7 +197,7 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | Non
             return None
     else:
         return None
-    there = replace(orbit, joints=joints, vector=vector, residual=float(np.max(np.abs(residual))))
+    there = replace(orbit, joints=joints, vector=vector, residual=float(np.abs(residual).max()))
     rates[active] = 0.0
     other = int(np.argmax(np.abs(rates)))
     vectors, _ = null_space(there.system, joints, vector, active)
@@ -249,10 +249,10 @@ def _reduced(orbit: Orbit, vector: FloatArray, border: Border) -> FloatArray | N
     for _ in range(_STEPS):
         residual, by_joints, _ = equations_at(orbit.system, joints, vector, False)
         full = _bordered(by_joints, border)
-        if not (np.all(np.isfinite(full)) and np.all(np.isfinite(residual))):
+        if not (np.isfinite(full).all() and np.isfinite(residual).all()):
             return None
         change = np.linalg.solve(full, np.append(-residual, 0.0))[:-1]
-        size = float(np.max(np.abs(change)))
+        size = float(np.abs(change).max())
         if size > max(before, _STALLS):
             return None
         joints, before = joints + change.reshape(joints.shape), size

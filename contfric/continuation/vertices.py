@@ -7,10 +7,9 @@ located on the simpler orbit, of which one multiplier of a turn is -1.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from contfric.base.kept import altered
 from contfric.continuation.doubling_point import EVEN, NEARLY, solved_at_vertex
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point
@@ -42,12 +41,12 @@ def symmetrised(orbit: Orbit, farthest: float = NEARLY) -> Orbit | None:
     image = orbit.joints[n:].copy()
     image[:, 0] -= 0.5 * orbit.period
     image[:, 1:] = image[:, 1:] @ orbit.model.symmetry.array()
-    if np.max(np.abs(image - orbit.joints[:n])) > farthest:
+    if np.abs(image - orbit.joints[:n]).max() > farthest:
         return None
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
     part = build_system(orbit.model, half, system.periods, half=True)
-    return replace(orbit, system=part, joints=middle)
+    return altered(orbit, system=part, joints=middle)
 
 
 def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
@@ -65,12 +64,12 @@ def undoubled(orbit: Orbit, farthest: float = NEARLY) -> Orbit | None:
         return None
     image: FloatArray = orbit.joints[n:].copy()
     image[:, 0] -= 0.5 * orbit.period
-    if np.max(np.abs(image - orbit.joints[:n])) > farthest:
+    if np.abs(image - orbit.joints[:n]).max() > farthest:
         return None
     part = build_system(orbit.model, system.itinerary[:n], system.periods // 2)
     middle = 0.5 * (image + orbit.joints[:n])
     middle = clocked(orbit.model, middle, float(middle[0, 0]) + 0.5 * orbit.period)
-    return replace(orbit, system=part, joints=middle)
+    return altered(orbit, system=part, joints=middle)
 
 
 def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
@@ -83,13 +82,13 @@ def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
     if not orbit.system.holds:
         return None
     for part in (symmetrised(orbit), undoubled(orbit)):
-        if part is None or np.max(np.abs(part.joints - orbit.joints[: len(part.joints)])) > _ODD:
+        if part is None or np.abs(part.joints - orbit.joints[: len(part.joints)]).max() > _ODD:
             continue
         null = null_vectors(part.system, part.joints, part.vector)
         if len(null) > 1 and (shorter := simpler_fold(part, settings)) is not None:
             return shorter
         point = first_point(part, settings, null[0], 0.0) if len(null) == 1 else None
-        if point is not None and np.max(np.abs(point.joints - part.joints)) < _ODD:
+        if point is not None and np.abs(point.joints - part.joints).max() < _ODD:
             return point.orbit(part.system, part.vector, part.model.index_of(settings.parameter))
     return None
 
@@ -153,9 +152,9 @@ def at_vertex(point: Point, simple: Orbit, active: int) -> Point:
     """Return the end point of a branch at a vertex, from the simpler orbit that is located there."""
     joints = joints_like(simple, point.joints)
     same = joints.shape == point.joints.shape
-    if not same or np.max(np.abs(joints - point.joints)) > NEARLY:
+    if not same or np.abs(joints - point.joints).max() > NEARLY:
         return point
-    return replace(point, joints=joints, w=simple.vector[[active]])
+    return altered(point, joints=joints, w=simple.vector[[active]])
 
 
 def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
@@ -171,7 +170,7 @@ def joints_like(simple: Orbit, joints: FloatArray) -> FloatArray:
 def parabola_vertex(before: Point, after: Point, share: float) -> Point:
     """Return the point between two at which the parameter's slope, taken as linear, vanishes."""
     step = after.arc - before.arc
-    return replace(
+    return altered(
         before,
         joints=before.joints + share * (after.joints - before.joints),
         w=before.w + 0.5 * before.direction * share * step,

@@ -19,6 +19,7 @@ from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
 from contfric.quantities.registry import quantity_of
+from contfric.remember.advance import cores_are_busy
 
 #: Values of the parameter at which an orbit to begin with is looked for: the one given, then others, spread
 #: by the golden section. Where four in five are chaotic, eight miss the rest in one of six, and say so.
@@ -66,7 +67,8 @@ def compute_ensemble_tile(tile: EnsembleTile, stop: IntArray | None = None) -> R
     for number, vector in enumerate(tile.vectors):
         if stop is not None and stop[0]:
             raise KeyboardInterrupt
-        gathered.add(tile, number, vector)
+        with cores_are_busy():
+            gathered.add(tile, number, vector)
     return gathered.rows()
 
 

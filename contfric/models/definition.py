@@ -256,13 +256,17 @@ class Model(Shown, TransitionMaps):
         ParameterError
             If the model has no such parameter.
         """
-        names = self.parameter_names
-        given: object = name  # whatever the user gave
-        if not isinstance(given, str) or given not in names:
-            raise ParameterError(
-                f"model '{self.name}' has no parameter {shown(given)}{did_you_mean(given, names)}"
-            )
-        return names.index(name)
+        try:
+            return self._parameter_index[name]
+        except (KeyError, TypeError):  # whatever the user gave
+            names, given = self.parameter_names, shown(name)
+        raise ParameterError(
+            f"model '{self.name}' has no parameter {given}{did_you_mean(name, names)}"
+        )
+
+    @cached_property
+    def _parameter_index(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.parameter_names)}
 
     def check_params(self, params: Mapping[str, Any]) -> dict[str, float]:
         """Return all parameters as floats, defaults filled in.

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.kept import cached_property
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:

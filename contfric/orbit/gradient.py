@@ -11,16 +11,17 @@ columns of F_p as right-hand sides. Every quantity is differentiated in those di
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from contfric.base.tabled import Columns, Tabled
-from contfric.errors import ConvergenceError
+from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.quantities.measure import differentiated
+from contfric.quantities.at_once import differentiated_at_once
+from contfric.quantities.measure import NumberWithGradient, differentiated
 from contfric.quantities.motion import Directions, along_parameters
 from contfric.quantities.registry import number_quantity
 
@@ -88,11 +89,31 @@ def gradient_of(orbit: Orbit, name: str) -> Gradient:
     """Return the derivatives of a quantity by every parameter; see :meth:`contfric.Orbit.gradient`."""
     quantity = number_quantity(name, orbit.model, "a gradient")
     found = differentiated(quantity, orbit, by_parameters(orbit))
+    return _gradient(orbit, name, found, _events(orbit))
+
+
+def gradients_of(orbit: Orbit, names: Iterable[str]) -> dict[str, Gradient]:
+    """Return the derivatives of several quantities; see :meth:`contfric.Orbit.gradients`."""
+    if isinstance(names, str):
+        raise ParameterError(
+            f"gradients takes a list of quantities, such as ['{names}'], got '{names}'"
+        )
+    names = list(dict.fromkeys(names))
+    quantities = [number_quantity(name, orbit.model, "a gradient") for name in names]
+    found = differentiated_at_once(quantities, orbit, by_parameters(orbit))
+    events = _events(orbit)
+    return {
+        name: _gradient(orbit, name, each, events) for name, each in zip(names, found, strict=True)
+    }
+
+
+def _gradient(
+    orbit: Orbit, name: str, found: NumberWithGradient, events: tuple[str, ...]
+) -> Gradient:
     names = orbit.model.parameter_names
-    notes = (*found.kinks, *_events(orbit))
     ahead = _named(names, found.ahead)
     behind = ahead if found.behind is found.ahead else _named(names, found.behind)
-    return Gradient(name, found.value, ahead, behind, notes)
+    return Gradient(name, found.value, ahead, behind, (*found.kinks, *events))
 
 
 def by_parameters(orbit: Orbit) -> Directions:

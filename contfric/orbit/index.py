@@ -27,6 +27,7 @@ of others (:func:`opening_sign`). Other than a multiplier it is defined with hol
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,33 +69,79 @@ def opening_sign(orbit: Orbit) -> int | None:
     return None if orbit.model.autonomous else _turn_sign(orbit, 1, -1.0)
 
 
+def opening_signs(orbits: Sequence[Orbit]) -> list[int | None]:
+    """Return the same for many orbits of one itinerary: all of them at once.
+
+    Examples
+    --------
+    >>> import contfric as cf
+    >>> orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    >>> opening_signs([orbit, orbit]) == [opening_sign(orbit)] * 2
+    True
+    """
+    if not orbits or orbits[0].model.autonomous:
+        return [None for _ in orbits]
+    system = orbits[0].system
+    every = [jacobian_blocks(system, o.joints, o.vector, parameters=False) for o in orbits]
+    a, b, close = (np.array([blocks[k] for blocks in every]) for k in (0, 1, 3))
+    matrices = _matrix_of_turn(system, a, b, close, 1, -1.0)
+    if matrices is None:  # an exit of one of them is tangential
+        return [opening_sign(orbit) for orbit in orbits]
+    return _signs(matrices)
+
+
 def _turn_sign(orbit: Orbit, times: int, sign: float) -> int | None:
-    system, m = orbit.system, orbit.joints.shape[1]
+    system = orbit.system
     a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector, parameters=False)
-    pins = _pins(system, a, b)
+    matrix = _matrix_of_turn(system, a[None], b[None], close[None], times, sign)
+    return None if matrix is None else _signs(matrix)[0]
+
+
+def _matrix_of_turn(
+    system: System, a: FloatArray, b: FloatArray, close: FloatArray, times: int, sign: float
+) -> FloatArray | None:
+    """Return the matrices whose determinants count, of orbits with these blocks; None if one is singular.
+
+    Parameters
+    ----------
+    a, b, close : blocks and closures of the orbits, shapes (k, N, m, m) and (k, m, m); the first two are
+        changed in place
+    """
+    (count, segments, m), pins = a.shape[:3], _pins(system, a, b)
     holds = len(pins)
-    moved: FloatArray = np.eye(m, m + holds * times)
-    rows = np.zeros((holds * times, m + holds * times))
+    size = m + holds * times
+    last = np.zeros((count, segments, m, 1))
+    last[:, :, -1] = 1.0
+    try:  # joints from those before them, and from the lengths of holds
+        steps = np.linalg.solve(b, np.concatenate([-a, last], axis=3))
+    except np.linalg.LinAlgError:  # an exit is tangential
+        return None
+    moved: FloatArray = np.zeros((count, m, size))
+    moved[:, range(m), range(m)] = 1.0
+    found = np.zeros((count, size, size))
+    rows = found[:, m:]
     for turn in range(times):
-        for i in range(system.segments):
-            before, right = moved, -a[i] @ moved
+        for i in range(segments):
+            before, moved = moved, steps[:, i, :, :m] @ moved
             if i in pins:
-                right[-1, m + turn * holds + pins[i].number] += 1.0
-            try:
-                moved = np.asarray(np.linalg.solve(b[i], right), dtype=np.float64)
-            except np.linalg.LinAlgError:  # an exit is tangential
-                return None
+                moved[:, :, m + turn * holds + pins[i].number] += steps[:, i, :, m]
             for pin in pins.values():
                 if pin.segment == i:
-                    rows[turn * holds + pin.number] = pin.on_start @ before + pin.on_end @ moved
+                    row = pin.on_start @ before + pin.on_end @ moved
+                    rows[:, turn * holds + pin.number] = row[:, 0]
         moved = np.asarray(np.linalg.solve(close, moved), dtype=np.float64)
-    left = np.eye(m) - sign * moved[:, :m]
-    return _sign(np.block([[left, sign * moved[:, m:]], [rows[:, :m], -rows[:, m:]]]))
+    found[:, :m] = sign * moved
+    found[:, :m, :m] = np.eye(m) - found[:, :m, :m]
+    rows[:, :, m:] *= -1.0
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Pin:
-    """The pin of one hold: a row on the start and the end of a segment, growing from "leaves" to "held"."""
+    """The pin of one hold: rows on the start and the end of a segment, growing from "leaves" to "held".
+
+    Those of several orbits, shape (k, 1, m).
+    """
 
     number: int
     segment: int
@@ -111,29 +158,27 @@ def _pins(system: System, a: FloatArray, b: FloatArray) -> dict[int, _Pin]:
     model, pins = system.model, {}
     for number, hold in enumerate(system.holds):
         h, mode = hold.segment, system.itinerary[hold.segment][0]
-        nothing = np.zeros(a.shape[1])
         if hold.pin is not None:
             sign = inside_sign(model, mode, hold.pin)
-            pins[h] = _Pin(number, h, sign * a[h, -1], nothing)
+            pins[h] = _Pin(number, h, sign * a[:, h, -1:], np.zeros_like(a[:, h, -1:]))
         else:
             before, exit_ = system.itinerary[h - 1]
             sign = inside_sign(model, before, exit_) * (1 if hold.after_rest else -1)
-            pins[h] = _Pin(number, h - 1, sign * a[h - 1, -1], sign * b[h - 1, -1])
-            a[h - 1, -1], b[h - 1, -1] = nothing, a[h, -1]
-        a[h, -1], b[h, -1] = nothing, nothing
-        a[h, -1, 0], b[h, -1, 0] = -1.0, 1.0
+            pins[h] = _Pin(number, h - 1, sign * a[:, h - 1, -1:], sign * b[:, h - 1, -1:])
+            a[:, h - 1, -1], b[:, h - 1, -1] = 0.0, a[:, h, -1]
+        a[:, h, -1], b[:, h, -1] = 0.0, 0.0
+        a[:, h, -1, 0], b[:, h, -1, 0] = -1.0, 1.0
     return pins
 
 
-def _sign(matrix: FloatArray) -> int | None:
-    """Return the sign of a determinant; None if rounding decides it."""
-    if not np.all(np.isfinite(matrix)):
-        return None
-    size = np.linalg.norm(matrix, axis=1)
-    if np.any(size == 0.0):
-        return None
-    sign, logarithm = np.linalg.slogdet(matrix / size[:, None])
-    return int(sign) if logarithm > np.log(_NO_SIGN) else None
+def _signs(matrices: FloatArray) -> list[int | None]:
+    """Return the signs of determinants; None where rounding decides."""
+    size = np.linalg.norm(matrices, axis=2)
+    told = np.isfinite(matrices).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    scaled = np.where(told[:, None, None], matrices, np.eye(matrices.shape[1]))
+    signs, logarithms = np.linalg.slogdet(scaled / np.where(told[:, None], size, 1.0)[:, :, None])
+    told &= logarithms > np.log(_NO_SIGN)
+    return [int(sign) if known else None for sign, known in zip(signs, told, strict=True)]
 
 
 def index_at_infinity(model: Model, vector: FloatArray) -> int | None:
@@ -148,7 +193,7 @@ def index_at_infinity(model: Model, vector: FloatArray) -> int | None:
     if _linear_part(flow, _SOON * flow.period) is None:  # which is seen at little cost
         return None
     linear = _linear_part(flow, flow.period)
-    return None if linear is None else _sign(np.eye(len(linear)) - linear)
+    return None if linear is None else _signs((np.eye(len(linear)) - linear)[None])[0]
 
 
 def _linear_part(flow: FlowView, lasts: float) -> FloatArray | None:

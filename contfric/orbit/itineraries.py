@@ -107,8 +107,13 @@ def encode(crossed: list[str], surfaces: list[str]) -> int:
 def mirrored_labels(labels: IntArray, model: Model) -> IntArray:
     """Return the labels of the mirror image: the same crossings of the mirrored surfaces."""
     assert model.symmetry is not None
-    image = model.symmetry.surfaces
-    surfaces = [s.name for s in model.surfaces]
     codes, inverse = np.unique(labels, return_inverse=True)
-    mirrored = [encode([image[s] for s in decode(int(c), surfaces)], surfaces) for c in codes]
+    mirrored = [_mirrored_code(code, model) for code in codes.tolist()]
     return np.array(mirrored, dtype=np.int64)[inverse].reshape(labels.shape)
+
+
+@cache
+def _mirrored_code(code: int, model: Model) -> int:
+    assert model.symmetry is not None
+    image, surfaces = model.symmetry.surfaces, [s.name for s in model.surfaces]
+    return encode([image[s] for s in decode(code, surfaces)], surfaces)

@@ -5,6 +5,7 @@ For single orbits; along a branch the engine has the pencil from the elimination
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from contfric.models.definition import FloatArray
 from contfric.orbit.system import System
 
+#: No parameter.
+_NONE = np.empty(0, dtype=np.int64)
 #: Singular values below this share of the largest are zero: at an event they are good to the root of rounding
 #: at worst.
 _NULL = 1e-7
@@ -46,9 +49,9 @@ def linearised(
     from contfric.orbit.blocks import linearise
 
     count, m = joints.shape
-    a, b = np.empty((count, m, m)), np.empty((count, m, m))
-    chosen = parameters if not isinstance(parameters, bool) else range(len(vector) * parameters)
-    which = np.array(chosen, dtype=np.int64)
+    a, b = np.empty((2, count, m, m))
+    chosen = range(len(vector)) if parameters is True else parameters
+    which = np.array(chosen, dtype=np.int64) if chosen else _NONE
     c, r = np.empty((count, m, len(which))), np.empty((count, m, 1))
     close = np.empty((m, m))
     linearise(
@@ -115,7 +118,7 @@ def tangent_of(
     wanted[size] = 1.0
     null: FloatArray = np.cos(np.arange(1.0, size + 2.0))  # no direction of an orbit
     for _ in range(2):
-        full[size] = null / np.linalg.norm(null)
+        full[size] = null / math.sqrt(null.dot(null))
         null = np.asarray(np.linalg.solve(full, wanted), dtype=np.float64)
     return null[:size].reshape(joints.shape), float(null[size])
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.extras import need_flint
+from contfric.base.kept import altered
 from contfric.base.renamed import renamed
 from contfric.base.tabled import as_table
 from contfric.base.tally import tally
@@ -27,7 +27,10 @@ from contfric.orbit.stops import reach_of, stops_of
 from contfric.orbit.system import Itinerary, System, build_system
 from contfric.signature import Signature
 
+if not TYPE_CHECKING:
+    from contfric.base.kept import cached_property
 if TYPE_CHECKING:
+    from functools import cached_property
     from pathlib import Path
 
     import pandas as pd
@@ -84,7 +87,7 @@ class Orbit(MeasuredOrbit):
     residual: float
     status: Status = Status.CONVERGED
 
-    @property
+    @cached_property
     def model(self) -> Model:
         """The model that moves."""
         return self.system.model
@@ -116,7 +119,7 @@ class Orbit(MeasuredOrbit):
             return -float(self.joints[0, 0])
         return self.system.layout.turn * self.flow.period
 
-    @property
+    @cached_property
     def period(self) -> float:
         """Duration of the orbit, nondimensional."""
         return self.turn * (2.0 if self.system.half else 1.0)
@@ -169,18 +172,18 @@ class Orbit(MeasuredOrbit):
     @cached_property
     def _whole(self) -> Orbit:
         system = build_system(self.model, self.itinerary, self.periods)
-        return replace(self, system=system, joints=self.cycle)
+        return altered(self, system=system, joints=self.cycle)
 
     def as_half(self) -> Orbit:
         """Return a symmetric orbit as a problem on its half; any other orbit as it is."""
-        half = (
-            None if self.system.half else half_of(self.model, self.system.itinerary, self.periods)
-        )
+        if self.system.half:
+            return self
+        half = half_of(self.model, self.system.itinerary, self.periods)
         if half is None or not self.symmetric:
             return self
         system = build_system(self.model, half, self.periods, half=True)
         joints = clocked(self.model, self.joints[: len(half)], float(self.joints[len(half), 0]))
-        return replace(self, system=system, joints=joints)
+        return altered(self, system=system, joints=joints)
 
     def doubled(self) -> Orbit:
         """Return the orbit run through twice, as one of twice the period."""
@@ -191,12 +194,11 @@ class Orbit(MeasuredOrbit):
             pair in self.model.sections for pair in whole.itinerary
         ):
             # a smooth cycle is found by one crossing each way, however long it is
-            return replace(
-                whole, system=build_system(self.model, whole.itinerary, self.periods * 2)
-            )
+            system = build_system(self.model, whole.itinerary, self.periods * 2)
+            return altered(whole, system=system)
         system = build_system(self.model, whole.itinerary * 2, self.periods * 2)
         joints = clocked(self.model, np.vstack([whole.joints, second]), whole.period)
-        return replace(whole, system=system, joints=joints)
+        return altered(whole, system=system, joints=joints)
 
     def mirror(self) -> Orbit:
         """Return the mirror image under the model's symmetry (an orbit of the same parameters)."""
@@ -211,12 +213,12 @@ class Orbit(MeasuredOrbit):
         joints[:, 1:] = self.joints[:, 1:] @ symmetry.array().T
         itinerary = mirror_pairs(self.model, self.system.itinerary)
         system = build_system(self.model, itinerary, self.periods, self.system.half)
-        return replace(self, system=system, joints=joints)
+        return altered(self, system=system, joints=joints)
 
     @cached_property
     def symmetric(self) -> bool:
         """Whether the orbit is its own mirror image."""
-        size = 1.0 + float(np.max(np.abs(self.joints)))
+        size = 1.0 + float(np.abs(self.joints).max())
         return self.mirror_distance < SYMMETRY_TOLERANCE * size
 
     @cached_property
@@ -231,7 +233,7 @@ class Orbit(MeasuredOrbit):
         image = self.joints[:n].copy()
         image[:, 0] += 0.5 * self.period
         image[:, 1:] = image[:, 1:] @ self.model.symmetry.array().T
-        return float(np.max(np.abs(image - self.joints[n:])))
+        return float(np.abs(image - self.joints[n:]).max())
 
     # ------------------------------------------------------------------ what is watched
 
@@ -239,12 +241,10 @@ class Orbit(MeasuredOrbit):
     def _watched(self) -> tuple[FloatArray, NDArray[np.int64], bool]:
         from contfric.orbit.monitor import examine
 
-        layout = self.system.layout
-        count = len(self.system.tests)
+        layout, count = self.system.layout, len(self.system.tests)
         watched = np.empty(count + len(layout.labels))
-        labels = np.zeros(len(layout.labels), dtype=np.int64)
-        at = self.system.functions(), layout, self.joints, self.vector
-        fine = examine(*at, watched, labels, tally())
+        labels, at = np.zeros(len(layout.labels), dtype=np.int64), (self.joints, self.vector)
+        fine = examine(self.system.functions(), layout, *at, watched, labels, tally())
         return watched[:count], labels, bool(fine)
 
     @cached_property

@@ -20,7 +20,7 @@ _LOCATED = 1e-9
 
 def margin_rounding(system: System, joints: FloatArray) -> float:
     """Return the rounding of a margin."""
-    return _ROUNDING * system.model.rounding * (1.0 + float(np.max(np.abs(joints))))
+    return _ROUNDING * system.model.rounding * (1.0 + float(np.abs(joints).max()))
 
 
 def margin_slack(system: System, joints: FloatArray) -> FloatArray:

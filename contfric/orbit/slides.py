@@ -7,10 +7,10 @@ inside of a slide. The slides of some length, joined over such touches, are the 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from contfric.base.kept import cached_property
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import state_within
@@ -93,7 +93,7 @@ def repeats(orbit: Orbit, slides: list[int], turns: int, mirrored: bool = False)
     if mirrored:
         assert symmetry is not None
         ahead[:, 1:] = ahead[:, 1:] @ symmetry.array().T
-    return bool(np.max(np.abs(ahead - starts)) < SAME_SOLUTION)
+    return bool(np.abs(ahead - starts).max() < SAME_SOLUTION)
 
 
 def repetitions(orbit: Orbit, slides: list[int]) -> int:
@@ -218,7 +218,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
         k
         for k in range(1, whole.periods + 1)
         if whole.periods % k == 0
-        and np.max(np.abs(np.roll(states, -k, axis=0) - states)) < SAME_SOLUTION
+        and np.abs(np.roll(states, -k, axis=0) - states).max() < SAME_SOLUTION
     )
     starts = np.column_stack([np.zeros(periods), states[:periods]])
     impacts = _impacts(whole)
@@ -238,7 +238,7 @@ def _at_one_phase(whole: Orbit) -> Outline:
 def _impacts(whole: Orbit) -> FloatArray:
     """Return time and state in front of each reset that changes the state: a grazing impact changes none."""
     behind = np.roll(whole.begins[:, 1:], -1, axis=0)
-    jumps = np.max(np.abs(behind - whole.ends[:, 1:]), axis=1) >= SAME_SOLUTION
+    jumps = np.abs(behind - whole.ends[:, 1:]).max(axis=1) >= SAME_SOLUTION
     struck = [whole.model.reset_at(*joint) is not None for joint in whole.itinerary]
     return np.array(whole.ends[jumps & np.array(struck)])
 

@@ -24,6 +24,8 @@ from contfric.orbit.system import System, build_system
 from contfric.remember.journal import SLOW, remembered
 from contfric.signature import Signature, reduced_itinerary
 
+#: What the kernel's numbers mean.
+_STATUSES = tuple(Status)
 #: Starts drawn for one signature: enough for every bundled signature to be found from scratch in
 #: the tests (the rarest needs about 150), at about a tenth of a millisecond each.
 STARTS = 600
@@ -60,7 +62,7 @@ def refine(orbit: Orbit, damped: bool = True) -> Orbit:
         np.empty((2, m, m)),
         tally(),
     )
-    return Orbit(orbit.system, joints, vector, float(residual), list(Status)[int(status)])
+    return Orbit(orbit.system, joints, vector, float(residual), _STATUSES[int(status)])
 
 
 def solve_orbit(

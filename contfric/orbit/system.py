@@ -23,7 +23,7 @@ Everything here derives from the model's definition; nothing knows what moves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -139,6 +139,14 @@ class System:
     def segments(self) -> int:
         """Number of segments of one turn."""
         return len(self.itinerary)
+
+    @cached_property
+    def closing(self) -> FloatArray:
+        """What closes the turn of a disturbance: by states as the orbit, in time if that is given; (m, m)."""
+        closing = np.eye(1 + len(self.model.states))
+        closing[0, 0] = 0.0 if self.model.autonomous else 1.0  # a turn may take another time
+        closing[1:, 1:] = self.layout.closing
+        return closing
 
     def functions(self) -> int:
         """Return the model's compiled functions as kernels take them."""

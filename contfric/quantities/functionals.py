@@ -16,12 +16,12 @@ the derivatives as each direction is followed, and against it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
+from contfric.base.kept import cached_property
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional
@@ -30,6 +30,7 @@ from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside
 from contfric.quantities.motion import Directions, IndexArray, OrbitMotion, Place, SegmentNodes
 from contfric.quantities.panels import Function, Resolved, evaluated, integral, least_size, resolve
+from contfric.quantities.tape import Tape
 
 #: Extrema that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
 _EQUAL = 1e-10
@@ -42,7 +43,9 @@ _STEPS = 2
 _WIDTHS = (1e-4, 1e-6, 1e-8)
 
 #: Integrals over an orbit, with their derivatives, shape (L, D).
-_Totals = tuple[list[float], FloatArray]
+Totals = tuple[list[float], FloatArray]
+#: What is integrated: for which functional, and the rate of its waves, 0 without them.
+Asked = tuple[Functional, float]
 
 
 @dataclass(eq=False)
@@ -54,11 +57,13 @@ class Measuring:
     motion : the orbit and its directions
     inside : evaluates expressions along it
     kinks : what is one-sided, and why
+    known : integrals that were computed together (:mod:`contfric.quantities.at_once`)
     """
 
     motion: OrbitMotion
     inside: Inside
     kinks: list[str] = field(default_factory=list)
+    known: Mapping[Asked, Totals] = field(default_factory=dict)
 
     def number(self, value: float, slopes: FloatArray) -> Dual:
         """Return a number with its derivatives, the same on both sides."""
@@ -103,7 +108,7 @@ class Measuring:
         value, slopes = integral(self._resolved(self.motion, asked, function, size))
         return value, np.zeros(self.motion.count) + slopes
 
-    def _on_panels(self, asked: Functional) -> _Totals:
+    def _on_panels(self, asked: Functional) -> Totals:
         """Return what :meth:`_compiled` does, by the panels of Python."""
         function = self.inside.function(asked)
         functions = [_squared(function) if asked.kind == "rms" else function]
@@ -113,18 +118,31 @@ class Measuring:
         found = [self._on_panel(asked, each) for each in functions]
         return [value for value, _ in found], np.array([slopes for _, slopes in found])
 
-    def _compiled(self, asked: Functional, rate: float = 0.0) -> _Totals | None:
+    def _compiled(self, asked: Functional, rate: float = 0.0) -> Totals | None:
         """Return what is integrated for a functional by compiled code; None where it leaves it to panels.
 
         Parameters
         ----------
         rate : of the waves of a harmonic, which moves against the period
         """
+        known = self.known.get((asked, rate))
+        if known is not None or not is_compiled(asked, self.motion.orbit.model):
+            return known
+        return self.integrals(self.inside.tape(asked), rate)
+
+    def asked(self, functional: Functional) -> Asked:
+        """Return what is integrated for a functional."""
+        waves = functional.kind in ("amplitude", "phase")
+        return functional, self._rate(functional) if waves else 0.0
+
+    def _rate(self, asked: Functional) -> float:
+        return 2.0 * math.pi * self._cycles(asked) / self._period
+
+    def integrals(self, tape: Tape, rate: float) -> Totals | None:
+        """Return integrals by compiled code; None where it leaves them to panels."""
         orbit, directions = self.motion.orbit, self.motion.directions
-        if not is_compiled(asked, orbit.model):
-            return None
         which = None if directions is None else directions.moving[0]
-        found = orbit.integrals(self.inside.tape(asked), rate, which)
+        found = orbit.integrals(tape, rate, which)
         if found is None:
             return None
         values = found.values.tolist()
@@ -162,7 +180,7 @@ class Measuring:
     # ---------------------------------------------------------------------------- harmonics
 
     def _harmonic(self, asked: Functional) -> tuple[float, FloatArray]:
-        scale, rate = 2.0 / self._period, 2.0 * math.pi * self._cycles(asked) / self._period
+        scale, rate = 2.0 / self._period, self._rate(asked)
         totals, slopes = self._compiled(asked, rate) or self._on_panels(asked)
         a, b = scale * totals[0], -scale * totals[1]
         size = math.hypot(a, b)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -83,9 +83,14 @@ class Inside:
         """Return what is integrated for a functional as operations for compiled code."""
         known = self._tapes.get(asked)
         if known is None:
-            known = tape_of(self.model, asked.tree, self.definitions, self.observables, asked.kind)
+            known = self.tape_of_all((asked,))
             self._tapes[asked] = known
         return known
+
+    def tape_of_all(self, asked: Iterable[Functional]) -> Tape:
+        """Return what is integrated for several functionals, one after the other, as one tape."""
+        trees = [(functional.tree, functional.kind) for functional in asked]
+        return tape_of(self.model, trees, self.definitions, self.observables)
 
     def power(self, contact: str) -> Function:
         """Return the power that a contact dissipates as a function along a segment."""

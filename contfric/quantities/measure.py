@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,7 @@ from contfric.models.grammar import Scope
 from contfric.models.quantity_texts import Parsed, read
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.extreme import integrated, moved_peak, peak_of
-from contfric.quantities.functionals import Measuring
+from contfric.quantities.functionals import Asked, Measuring, Totals
 from contfric.quantities.inside import inside_of
 from contfric.quantities.motion import Directions, OrbitMotion
 from contfric.quantities.registry import NAMED, Quantity
@@ -74,9 +74,16 @@ def of_orbits(quantity: Quantity, orbits: Iterable[Orbit]) -> FloatArray:
 
 
 def differentiated(
-    quantity: Quantity, orbit: Orbit, directions: Directions | None
+    quantity: Quantity,
+    orbit: Orbit,
+    directions: Directions | None,
+    known: Mapping[Asked, Totals] | None = None,
 ) -> NumberWithGradient:
     """Return a quantity of an orbit with its derivatives in some directions.
+
+    Parameters
+    ----------
+    known : integrals that were computed together (:mod:`contfric.quantities.at_once`)
 
     Raises
     ------
@@ -89,12 +96,14 @@ def differentiated(
         )
     functional = integrated(quantity)
     if functional is not None:
-        measuring = Measuring(OrbitMotion(orbit, directions), inside_of(orbit.model))
+        measuring = Measuring(
+            OrbitMotion(orbit, directions), inside_of(orbit.model), known=known or {}
+        )
         with np.errstate(all="ignore"):
             value, slopes = measuring.smooth(functional)
         return NumberWithGradient(value, slopes, slopes)
     found = None if directions is None else _extreme(quantity, orbit, directions)
-    return found or _measured(quantity.parsed, orbit, directions)
+    return found or _measured(quantity.parsed, orbit, directions, known or {})
 
 
 def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> NumberWithGradient | None:
@@ -104,9 +113,11 @@ def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> Number
     return None if found is None else NumberWithGradient(found[0], found[1], found[1])
 
 
-def _measured(parsed: Parsed, orbit: Orbit, directions: Directions | None) -> NumberWithGradient:
+def _measured(
+    parsed: Parsed, orbit: Orbit, directions: Directions | None, known: Mapping[Asked, Totals]
+) -> NumberWithGradient:
     """Return an expression of an orbit, its functionals resolved."""
-    measuring = Measuring(OrbitMotion(orbit, directions), inside_of(orbit.model))
+    measuring = Measuring(OrbitMotion(orbit, directions), inside_of(orbit.model), known=known)
     with np.errstate(all="ignore"):
         found = _value(parsed, measuring)
     ahead, behind = found.slopes

@@ -18,12 +18,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.kept import cached_property
 from contfric.models.definition import FloatArray, Model
 from contfric.quantities.chatter import pieces
 from contfric.quantities.duals import Dual

@@ -145,25 +145,32 @@ class Recorder:
 
 def tape_of(
     model: Model,
-    tree: ast.expr,
+    asked: Iterable[tuple[ast.expr, str]],
     definitions: Mapping[str, ast.expr],
     observables: Iterable[str],
-    kind: str,
 ) -> Tape:
-    """Return an expression along an orbit as a tape: its square for ``rms``, times two waves for a harmonic.
+    """Return expressions along an orbit as one tape: squares for ``rms``, times two waves for a harmonic.
 
     The rate of the waves follows the parameters of the model, as one more.
+
+    Parameters
+    ----------
+    asked : each expression, and the kind of its functional
     """
     recorder, count = Recorder(), len(model.parameter_names)
     values = {TIME_NAME: recorder.add(TIME)}
     values |= {name: recorder.add(STATE, k) for k, name in enumerate(model.states)}
     values |= {name: recorder.add(PARAMETER, k) for k, name in enumerate(model.parameter_names)}
     values |= {name: recorder.add(OBSERVABLE, model.observable_index[name]) for name in observables}
-    found = Scope(recorder.algebra(), values, definitions).evaluate(tree)
-    if kind in ("amplitude", "phase"):
-        angle = values[TIME_NAME] * recorder.add(PARAMETER, count)
-        return _needed(recorder, [found * recorder.apply(wave, angle) for wave in ("cos", "sin")])
-    return _needed(recorder, [found * found if kind == "rms" else found])
+    scope, outputs = Scope(recorder.algebra(), values, definitions), []
+    for tree, kind in asked:
+        found = scope.evaluate(tree)
+        if kind in ("amplitude", "phase"):
+            angle = values[TIME_NAME] * recorder.add(PARAMETER, count)
+            outputs += [found * recorder.apply(wave, angle) for wave in ("cos", "sin")]
+        else:
+            outputs.append(found * found if kind == "rms" else found)
+    return _needed(recorder, outputs)
 
 
 def _needed(recorder: Recorder, outputs: list[Recorded]) -> Tape:

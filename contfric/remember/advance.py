@@ -85,8 +85,8 @@ _BESIDE: ContextVar[bool] = ContextVar("contfric_beside", default=False)
 
 @contextmanager
 def in_advance() -> Iterator[None]:
-    """Let calls be begun in advance while the block runs, where there is a second core."""
-    if _HERE.get() is not None or processors() < 2:
+    """Let calls be begun in advance while the block runs, where there is a second core for it."""
+    if _HERE.get() is not None or _BESIDE.get() or processors() < 2:
         yield
         return
     advance = _Advance()
@@ -96,6 +96,17 @@ def in_advance() -> Iterator[None]:
     finally:
         _HERE.reset(token)
         advance.close()
+
+
+@contextmanager
+def cores_are_busy() -> Iterator[None]:
+    """Begin nothing in advance while the block runs: it is one of many tasks, which have all cores."""
+    token, outer = _BESIDE.set(True), _HERE.set(None)
+    try:
+        yield
+    finally:
+        _HERE.reset(outer)
+        _BESIDE.reset(token)
 
 
 def foresee(function: Callable[P, object], *args: P.args, **kwargs: P.kwargs) -> bool:

@@ -96,7 +96,22 @@ def apply_edit(itinerary: Sequence[ReducedPair], edit: Edit, model: Model) -> Re
     NotationError
         If the graph has no such walk.
     """
-    edited = tuple(pair for _, pair in edited_pieces(itinerary, edit))
+    return walked(itinerary, edited_pieces(itinerary, edit), model)
+
+
+def walked(
+    itinerary: Sequence[ReducedPair],
+    pieces: Sequence[tuple[tuple[int, int], ReducedPair]],
+    model: Model,
+) -> ReducedItinerary:
+    """Return the itinerary of the pieces that an edit makes of one.
+
+    Raises
+    ------
+    NotationError
+        If the graph has no such walk.
+    """
+    edited = tuple([pair for _, pair in pieces])
     if not is_closed_walk(edited, model):
         raise NotationError(
             f"{show(itinerary)} cannot become {show(edited)}: the transitions of model '{model.name}' "
@@ -116,8 +131,8 @@ def edited_pieces(
     for index, (mode, exit_) in enumerate(itinerary):
         if index not in edit.dropped:
             pieces.append(((index, -1), (mode, edit.renamed.get(index, exit_))))
-        for k, pair in enumerate(edit.inserted.get(index, ())):
-            pieces.append(((index, k), pair))
+        if index in edit.inserted:
+            pieces += [((index, k), pair) for k, pair in enumerate(edit.inserted[index])]
     return pieces
 
 
@@ -185,9 +200,17 @@ def swap_stops(
 
 def swap_edit(segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model) -> Edit:
     """Return the edit that swaps stick and reversal at stops; see :func:`swap_stops`."""
+    pairs = tuple((mode, surface) for mode, surface in segments)
+    return _swap_edit(pairs, tuple(events.items()), model)
+
+
+@cache
+def _swap_edit(
+    segments: ReducedItinerary, events: tuple[tuple[int, str], ...], model: Model
+) -> Edit:
     itinerary = _checked(segments, model)
     edit = Edit()
-    for joint, surface in events.items():
+    for joint, surface in events:
         following = _stop(itinerary, joint, surface, model)
         if model.lies_on(itinerary[following][0], itinerary[joint][1]):
             edit |= drop(_removable(itinerary, following, surface))

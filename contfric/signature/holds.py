@@ -41,6 +41,7 @@ def hold_at(surface: str) -> str:
     return f"{_HOLD}{surface}"
 
 
+@cache
 def is_hold(name: str) -> bool:
     """Return whether a name (of a segment, or of an exit in an itinerary) is that of a hold."""
     return name.startswith(_HOLD)

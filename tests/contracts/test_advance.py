@@ -187,3 +187,14 @@ def test_a_diagram_is_the_same_to_the_last_bit(
     for a, b in zip(alone.branches, beside.branches, strict=True):
         assert np.array_equal(a.joints, b.joints) and np.array_equal(a.values, b.values)
         assert [e.kind for e in a.bifurcations] == [e.kind for e in b.bifurcations]
+
+
+def test_a_task_among_many_begins_nothing_in_advance() -> None:
+    from contfric.remember import advance
+
+    with advance.cores_are_busy(), advance.in_advance():
+        assert advance._HERE.get() is None
+        assert not advance.foresee(lambda: None)
+    with advance.in_advance(), advance.cores_are_busy():
+        assert advance._HERE.get() is None
+    assert not advance._BESIDE.get()

@@ -165,3 +165,35 @@ def test_extrema_in_expressions_are_those_of_python(params: dict[str, float]) ->
         assert bool(compiled.notes) == bool(by_python.notes)
         for name, slope in by_python.items():
             assert compiled[name] == pytest.approx(slope, rel=1e-8, abs=1e-9), (text, name)
+
+
+TOGETHER = (
+    *("x_max", "mean(v)", "rms(v)", "energy", "amplitude(x, 1)", "phase(x, 3)", "rms(x)/energy"),
+    *("amplitude(v, 1)", "integral(abs(v))", "mean(abs(x))", "min(v)", "period"),
+)
+
+
+@given(PARAMS, st.sets(st.sampled_from(TOGETHER), min_size=2))
+@settings(max_examples=15)
+def test_gradients_at_once_are_those_of_each(params: dict[str, float], names: set[str]) -> None:
+    orbit = found(params)
+    if orbit is None:
+        return
+    together = orbit.gradients(sorted(names))
+    assert list(together) == sorted(names)
+    for name, gradient in together.items():
+        alone = orbit.gradient(name)
+        assert gradient.quantity == name
+        assert gradient.value == pytest.approx(alone.value, rel=1e-12, abs=1e-13)
+        assert dict(gradient.ahead) == pytest.approx(dict(alone.ahead), rel=1e-10, abs=1e-10)
+        assert dict(gradient.behind) == pytest.approx(dict(alone.behind), rel=1e-10, abs=1e-10)
+        assert gradient.notes == alone.notes
+
+
+def test_gradients_say_what_they_take() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    with pytest.raises(ContfricError, match=r"a list of quantities, such as \['energy'\]"):
+        orbit.gradients("energy")
+    with pytest.raises(ContfricError, match="enrgy"):
+        orbit.gradients(["energy", "enrgy"])
+    assert orbit.gradients([]) == {}
