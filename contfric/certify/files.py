@@ -128,7 +128,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "certificate": "event",
         "format": FORMAT,
         "model": model,
-        "params": dict(event.params),
+        "params": {k: v for k, v in event.params.items() if k != proof.parameter},
         "parameter": proof.parameter,
         "kind": event.kind.value,
         "value": value,
