@@ -314,7 +314,7 @@ def test_a_branch_is_covered_towards_an_end_that_is_not_found(
 ) -> None:
     """Only next to the end, where the equations may be singular, is nothing proved."""
     orbit = cf.solve_orbit("coulomb", "0s", SCENE | {"Omega": 0.57})
-    branch = cf.continue_orbit(orbit, "Omega", (0.567, 0.573))
+    branch = cf.continue_orbit(orbit, "Omega", (0.56, 0.58))
     exact, last = Tracer._exact, len(branch) - 1
 
     def not_at_ends(self: Tracer, k: int, printed: Vector, plane: Vector) -> Vector | None:
