@@ -87,7 +87,7 @@ def test_a_time_limit_is_named() -> None:
 def test_an_event_ends_at_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever it comes: no orbit is evaluated after it, and no inequality."""
     event = next(b for b in diagram().bifurcations if b.kind is cf.Kind.SN)
-    evaluations = []
+    evaluations: list[Any] = []
 
     def clock() -> float:
         return float(len(evaluations))
@@ -170,7 +170,7 @@ def test_an_event_that_the_checker_refuses_is_said_and_not_in_the_file(
     """Where two events happen at once a file of one would be refused, and all that stands next to it."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
     branch = cf.continue_orbit(orbit, "Omega", (0.538, 0.545))
-    proofs = [branch.bifurcations[0].certify(), orbit.certify()]
+    proofs: list[Any] = [branch.bifurcations[0].certify(), orbit.certify()]
     assert [part["certificate"] for part in files.checkable(proofs)] == ["event", "orbit"]
     own = files.event_data
     monkeypatch.setattr(files, "event_data", lambda proof: own(proof) | {"kind": "PD"})
