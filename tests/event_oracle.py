@@ -185,7 +185,10 @@ def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 def _other_parameter(data: dict[str, Any], rng: np.random.Generator) -> None:
-    data["parameter"] = str(rng.choice(list(data["params"])))
+    name, value = str(rng.choice(list(data["params"]))), float(ball(data["value"])[0])
+    data["params"] = {**data["params"], data["parameter"]: value}
+    del data["params"][name]
+    data["parameter"] = name
 
 
 _CHANGES = (

@@ -23,7 +23,7 @@ from contfric.certify.diagram_certificate import (
     Gap,
     merged,
 )
-from contfric.certify.events import EventCertificate, certify_event
+from contfric.certify.events import LATE, EventCertificate, certify_event
 from contfric.certify.files import checkable, checked
 from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
@@ -32,8 +32,6 @@ from contfric.continuation.events import Bifurcation
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 
-#: What is said of a part that a time limit has left out.
-_NOT_REACHED = "not reached within the time limit"
 _INTERRUPTED = "interrupted"
 
 
@@ -113,7 +111,7 @@ def _tubes(
 
 
 def _is_unfinished(proof: BranchCertificate | EventCertificate) -> bool:
-    return isinstance(proof, BranchCertificate) and bool(proof.ended)
+    return bool(proof.ended)
 
 
 def _silent(_: str) -> None:
@@ -185,9 +183,7 @@ def _event_summary(
     event: Bifurcation, branches: tuple[int, ...], proof: EventCertificate | None
 ) -> EventSummary:
     if proof is None:
-        return EventSummary(
-            event.label, event.kind.value, branches, math.nan, "", None, _NOT_REACHED
-        )
+        return EventSummary(event.label, event.kind.value, branches, math.nan, "", None, LATE)
     printed = event.params[proof.parameter]
     if proof.value is None:
         return EventSummary(event.label, event.kind.value, branches, printed, "", None, proof.why)
@@ -201,7 +197,7 @@ def _branch_summary(number: int, branch: Branch, proof: BranchCertificate | None
     length = float(branch.arc[-1] - branch.arc[0])
     ends = (float(branch.values[0]), float(branch.values[-1]))
     if proof is None:
-        gaps: tuple[Gap, ...] = (Gap(*ends, length, _NOT_REACHED),)
+        gaps: tuple[Gap, ...] = (Gap(*ends, length, LATE),)
         return BranchSummary(number, branch.name, length, 0.0, 0.0, 0, gaps)
     gaps = merged([Gap(*p.values, p.stop - p.start, p.why) for p in proof.pieces if not p.proved])
     return BranchSummary(

@@ -44,6 +44,17 @@ from contfric.orbit.orbit import Orbit
 _BITS = (160, 320)
 #: Bits of the working precision that rounding may take.
 _SPARE = 30
+#: What is said of an event that a time limit has ended, or left out.
+LATE = "not reached within the time limit"
+
+
+class _TimeOverError(Exception):
+    """The time for an attempt is over."""
+
+
+def _check_time(until: float) -> None:
+    if time.time() > until:
+        raise _TimeOverError
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,6 +81,8 @@ class EventCertificate(Shown):
         Its orbit on the shortest problem, and what vanishes there.
     zero : tuple of arb
         The zero of the extended system: joints, what the event needs next to them, the parameter.
+    ended : bool
+        Whether a time limit ended the work before anything was known.
     """
 
     event: Bifurcation
@@ -81,6 +94,7 @@ class EventCertificate(Shown):
     admissible: Finding
     location: EventPlace | None = None
     zero: tuple[arb, ...] = ()
+    ended: bool = False
 
     @property
     def proved(self) -> bool:
@@ -137,7 +151,7 @@ def certify_event(
     Parameters
     ----------
     parameter : that is free; by default the one along which the event was located
-    until : by ``time.time``; after it an attempt that fails is not repeated with more digits
+    until : when to end, by ``time.time``: within one step of Newton's method, or one inequality
 
     Raises
     ------
@@ -157,17 +171,19 @@ def certify_event(
         raise ParameterError("say in which parameter the event is located: certify('Omega')")
     event.orbit.model.index_of(parameter)
     ball_model(event.orbit.model, event.params)  # whether proofs are offered
+    found = replace(_undecided(event, parameter, LATE), ended=True)
     try:
+        _check_time(until)
         location = location_of(event)
+        for bits in _BITS:
+            with working(bits):
+                found = _attempt(event, location, parameter, bits, until)
+            if found.proved:
+                break
     except NotLocatedError as error:
         return _undecided(event, parameter, str(error))
-    found = None
-    for bits in _BITS:
-        with working(bits):
-            found = _attempt(event, location, parameter, bits)
-        if found.proved or time.time() > until:
-            break
-    assert found is not None
+    except _TimeOverError:  # with fewer digits it may have been tried
+        pass
     return found
 
 
@@ -177,13 +193,14 @@ def _undecided(event: Bifurcation, parameter: str, why: str) -> EventCertificate
 
 
 def _attempt(
-    event: Bifurcation, location: EventPlace, parameter: str, bits: int
+    event: Bifurcation, location: EventPlace, parameter: str, bits: int, until: float
 ) -> EventCertificate:
     orbit = location.orbit
     segments = segments_of(orbit.system)
     params = dict(event.params)
 
-    def build(value: arb) -> BallModel:
+    def build(value: arb) -> BallModel:  # for each evaluation of the equations
+        _check_time(until)
         return ball_model(orbit.model, params, parameter, value)
 
     equations, start = _extended(event, location, segments, build)
@@ -207,7 +224,7 @@ def _attempt(
         Finding(Verdict.PROVED),
         _simple(event, chain, z, touch, inclusion.zero[-3:-1]),
         _of_kind(event, location, chain, z, touch),
-        _admissible(orbit, chain, z, touch),
+        _admissible(orbit, chain, z, touch, until),
         location,
         tuple(inclusion.zero),
     )
@@ -311,8 +328,13 @@ def _of_kind(
     )
 
 
-def _admissible(orbit: Orbit, chain: Chain, z: Vector, touch: Touch | None) -> Finding:
+def _admissible(
+    orbit: Orbit, chain: Chain, z: Vector, touch: Touch | None, until: float
+) -> Finding:
     closing = closing_of(chain.segments, chain.model, orbit.system.half)
     plain = Chain(chain.segments, replace(chain.model, slopes=None))
-    found = inequalities(plain, orbit.system, chain.joints(z), closing, touch)
-    return all_of([inequality.named(orbit.system) for inequality in found])
+    found = []
+    for inequality in inequalities(plain, orbit.system, chain.joints(z), closing, touch):
+        _check_time(until)
+        found.append(inequality.named(orbit.system))
+    return all_of(found)

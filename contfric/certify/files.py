@@ -128,7 +128,7 @@ def event_data(proof: EventCertificate) -> dict[str, Any]:
         "certificate": "event",
         "format": FORMAT,
         "model": model,
-        "params": dict(event.params),
+        "params": {k: v for k, v in event.params.items() if k != proof.parameter},
         "parameter": proof.parameter,
         "kind": event.kind.value,
         "value": value,
@@ -233,4 +233,10 @@ def verify(path: Any) -> Answer:
         raise ResultFileError(
             f"cannot read {file}: {error}; give the path of a certificate"
         ) from error
-    return check_text(text)
+    answer = check_text(text)
+    if not answer.yes and '"checkable": []' in text:  # of another model, or all orbits have holds
+        why = (
+            f"it holds nothing that is checked: orbits without holds of {', '.join(CHECKED_MODELS)}"
+        )
+        return answer._replace(why=why)
+    return answer

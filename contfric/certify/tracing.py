@@ -38,6 +38,8 @@ _SAME, _PATIENT = 1.2, 32
 _TURNS = 0.8
 #: After so many boxes it is tried again whether they are found at once, by the half-widths of the last one.
 _AGAIN = 8
+#: Shares of the way to an end that is not known at which an orbit is looked for.
+_WAYS = (0.5, 0.25, 0.125)
 #: Most parts of a box in which its inequalities are looked at.
 _PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
@@ -182,7 +184,37 @@ class Tracer(Strand):
             return leave(self, first, last, arcs, left[1])
         elif None not in exact:
             return self.cover(first, last, arcs, 0)
+        elif exact != [None, None]:
+            return self._towards(first, last, arcs, 1 if exact[0] else 0)
         return [self._nothing(arcs, first, last)]
+
+    def _towards(
+        self, first: Vector, last: Vector, arcs: Arcs, end: int, level: int = 0
+    ) -> list[Piece]:
+        """Cover the stretch towards an end next to which no orbit is found, as far as there are orbits.
+
+        Where a branch ends without an event (at S = 0, say) its equations may be singular there.
+
+        Parameters
+        ----------
+        end : 1 if no orbit is next to the last point, 0 if none is next to the first one
+        level : how many parts of it are covered already
+        """
+        point, share = None, 0.0
+        if level <= HALVINGS and arcs[1] - arcs[0] > self.shortest and self.goes_on():
+            for share in _WAYS if end else [1 - way for way in _WAYS]:
+                point = self.middle(first, last, share)
+                if point is not None:
+                    break
+        if point is None:
+            return [self._nothing(arcs, first, last)]
+        between = arcs[0] + share * (arcs[1] - arcs[0])
+        before, after = (arcs[0], between), (between, arcs[1])
+        if end:
+            covered = self.cover(first, point, before, 0)
+            return [*covered, *self._towards(point, last, after, end, level + 1)]
+        rest = self._towards(first, point, before, end, level + 1)
+        return [*rest, *self.cover(point, last, after, 0)]
 
     def goes_on(self) -> bool:
         """Tell whether more boxes may be tried; else it is said what ended the work."""

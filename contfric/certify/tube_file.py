@@ -249,7 +249,7 @@ def _data(proof: BranchCertificate, run: _GrowingTube | None = None) -> dict[str
         "certificate": "tube",
         "format": FORMAT,
         "model": branch.model.name,
-        "params": branch[0].params,
+        "params": {k: v for k, v in branch[0].params.items() if k != branch.parameter},
         "parameter": branch.parameter,
         "periods": branch[0].periods,
         "half": bool(system.half),

@@ -12,8 +12,7 @@ from flint import arb, arb_mat, arb_series, ctx
 
 from contfric.verify.motion import Scene, Undecided, ball, part, see
 
-HALF, INSIDE = arb(0.51), arb(0, 0.51)  # of a box, which reaches beyond its ends
-STEEP, MOST_PIECES, MOST_HALVINGS = 0.02, 20_000, 90  # least share of a parameter; of a segment
+HALF, INSIDE, STEEP = arb(0.51), arb(0, 0.51), 0.02  # of a box, beyond its ends; of its parameter
 MET = {"CS": "1F0", "SS": "1F0", "GS": "1v1", "T": "1F1", "AS": "0F1"}  # slides, meets, in windows
 
 
@@ -64,8 +63,7 @@ class Link:
         """Return scene and unknowns of all orbits, as power series in the direction of their curve."""
         rates = self.rates(arb(0), 1) + 2 * INSIDE * self.rates(INSIDE, 2)
         turned = self.gap.solve(size(self.inverse * rates)).entries()
-        self.slope = self.along + column(arb(0, r.upper()) for r in turned)
-        return self.orbits(INSIDE, self.slope)
+        return self.orbits(INSIDE, self.along + column(arb(0, r.upper()) for r in turned))
 
     def equations(self, s: arb) -> tuple[arb_mat, arb_mat]:
         """Return F, and the Jacobian of F and b."""
@@ -134,8 +132,7 @@ def check_admissible(scene: Scene, z: list[arb], met: Any = (), short: bool = Fa
             _inside((scene, z), i, "v", direction, 1 + rest, True, met)
         for limit, name in () if direction else ((1, "F+"), (-1, "F-")):
             if vanishes and limit == side:  # the load grows on the way
-                rate = scene.observed(z, i, name, tau.union(arb(0)))[1]
-                see(side * rate, f"{what} is released transversally")
+                see(side * scene.observed(z, i, name, tau.union(arb(0)))[1], f"{what}: transversal")
             else:
                 _inside((scene, z), i, name, -limit, limit == start, limit == side, met)
 
@@ -156,7 +153,7 @@ def _inside(orbit: Any, i: int, name: str, sign: int, order: int, ends: bool, me
         stops = level > 0 and index == 2**level - 1 and ends and rate < 0
         lowest = touch is not None and piece.overlaps(touch) and bend > 0
         if not (value > 0 or starts or stops or lowest):
-            see(level < MOST_HALVINGS and len(waiting) <= MOST_PIECES, what, False)
+            see(level < 90 and len(waiting) <= 20_000, what, False)  # halvings, pieces
             waiting += [(level + 1, 2 * index), (level + 1, 2 * index + 1)]
 
 
@@ -174,8 +171,7 @@ def met_in(box: Link, a: Link, b: Link, kind: str, spots: list[Any]) -> dict[tup
         rate = part(Scene.observed(*moving, i, name, time)[0], 1)
         see(-first * rate, f"what vanishes at a {kind} falls")
         passed = passed or first * last < 0
-        if not window:
-            see(what * grows * (1 if kind == "CS" else -1), f"the load moves as at a {kind}")
+        see(len(window) or what * grows * (1 if kind == "CS" else -1), f"it moves as at a {kind}")
     see(passed, f"what vanishes at a {kind} changes its sign", False)
     return met if kind != "T" else {}  # which the law allows
 

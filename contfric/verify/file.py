@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, pairwise, product
 from typing import Any, NamedTuple
 
 from flint import acb, arb, ctx
@@ -11,8 +11,9 @@ from flint import acb, arb, ctx
 from contfric.verify.curve import INSIDE, Link, check_admissible, met_in
 from contfric.verify.motion import Refused, Scene, Undecided, ball, see
 
-FORMAT, CHECKED_MODELS, BITS = 2, ("coulomb",), (106, 212, 424, 848)  # until all is decided
-CLAIMS = "exists", "unique", "admissible", "stable", "unstable"  # of an orbit
+FORMAT, CHECKED_MODELS, BITS = 3, ("coulomb",), (106, 212, 424, 848)  # until all is decided
+CLAIMS = "unique", "admissible", "stable", "unstable"  # of an orbit that exists
+PARTS = [arb(0, 0.5)], [arb(k / 128, 1 / 128) for k in range(-63, 64, 2)]  # of a box
 
 
 class Answer(NamedTuple):
@@ -31,13 +32,12 @@ def check_text(text: str) -> Answer:
         data = json.loads(text)
         json.loads(text, object_pairs_hook=lambda p: see(len(dict(p)) == len(p), "names come once"))
         parts = data["checkable"] if data["certificate"] == "diagram" else [data]
-        moved = {k for p in parts[1:] for k, v in p["params"].items() if v != parts[0]["params"][k]}
-        moved |= {p["parameter"] for p in parts if "parameter" in p}
-        see(len(moved) < 2, "its parts are of one diagram")
+        moved = {k for p in parts for k, _ in p["params"].items() ^ parts[0]["params"].items()}
+        see(parts != [] and len(moved) < 2, "it has parts, all of one diagram")
         stated, orbits, bits = zip(*map(_check, parts), strict=True)
-        for (p, *own), (q, *others) in combinations(orbits, 2):
-            apart = p != q or any(all(s.misses(z, b) for b in others) for s, z in own)
-            see(apart, "no two parts are the same")
+        for (p, ends, boxes), (q, others, more) in combinations(orbits, 2):
+            pairs = [*product(ends, more), *product(others, boxes)] if p == q else []
+            see(all(_apart(*pair) for pair in pairs), "no two parts are the same, or overlap")
         counts = [f"{sum(p['certificate'] == name for p in parts)} {name}s" for name in CHECKS]
         counts += [f"{sum(p.get('ends', []).count(None) for p in parts)} open ends"]
         return Answer(True, "", tuple(stated[0] if parts == [data] else counts), max(bits))
@@ -47,10 +47,16 @@ def check_text(text: str) -> Answer:
         ctx.cap = cap
 
 
+def _apart(orbit: Any, box: Link) -> bool:
+    """Tell whether an orbit is none of a box."""
+    return any(all(orbit[0].misses(orbit[1], box.orbits(s)) for s in parts) for parts in PARTS)
+
+
 def _check(data: Any) -> tuple[list[str], list[Any], int]:
     name, why = data["certificate"], ""
     known = name in CHECKS and data.get("format") == FORMAT and data.get("model") in CHECKED_MODELS
     see(known, f"it is a certificate of format {FORMAT} of {', '.join(CHECKED_MODELS)}")
+    see((len(data), len(data["params"])) == (12, 4 + (name == "orbit")), "it states nothing else")
     for bits in BITS[name != "tube" :]:
         with ctx.workprec(bits):
             try:
@@ -84,7 +90,7 @@ def events_between(data: Any, a: Link, b: Link, end: Any) -> tuple[list[str], Li
 
 def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
     points, (left, right), found, boxes = orbits_at(data), data["ends"], list[Any](), list[Link]()
-    stop, ends = len(points) - 2, [points[k].orbits(0) for k in (0, -1)]
+    stop, knots, _ = len(points) - 2, [point.orbits(0) for point in points], data["unchecked"]
     see(stop >= bool(left and right) and "T" not in f"{left}{right}", "a tube may have such ends")
     for k, (a, b) in enumerate(pairwise(points)):
         first, last, end = (b, a, left) if left and k == 0 else (a, b, right if k == stop else None)
@@ -92,14 +98,13 @@ def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
             check_admissible(*first.orbits(0))
         kinds, box = events_between(data, first, last, end)
         found, boxes = [*found, *([k, kind] for kind in kinds)], [*boxes, box]
-        turn, pairs = -1 if left and k == 1 else 1, permutations((boxes[k - 1], box))
-        goes = [(p.border * p.along * p.border * q.slope)[0, 0] * turn for p, q in pairs]
-        see(max(goes, key=arb.lower), "it goes on and does not turn back")
-        past = k == 0 or Scene.misses(*box.orbits(INSIDE), ends[0])
-        see(past or INSIDE * (not box.holds(points[0])), "the first orbit does not come again")
+        others = [(0, box), (k - 1, box), (k + 1, boxes[k - 1])] if k else []
+        see(all(_apart(knots[j], part) for j, part in others), "no orbit comes again")
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
-    return ["one curve", "admissible", f"{len(data['events'])} events of multipliers"], ["", *ends]
+    same = sorted((k * d, k * e) for d, e in knots[0][0].segments for k in {1, knots[0][0].closing})
+    shown = f"{len(data['events'])} events of multipliers"
+    return ["one curve", "admissible", shown], [same, knots[:: stop + 1], boxes]
 
 
 def _check_event(data: Any) -> tuple[list[str], list[Any]]:
@@ -107,14 +112,14 @@ def _check_event(data: Any) -> tuple[list[str], list[Any]]:
     found, box = events_between(data, a, b, None if at is None else (kind, [at]))
     see(found == [kind], f"it has those events, not {found}")
     see(value.rad() - abs((near := box.orbits(INSIDE))[0].value - value.mid()), "it is in the ball")
-    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"], [kind, near]
+    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"], [kind, [near], [box]]
 
 
 def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
-    data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"]
-    see({"exists"} <= set(claims) <= set(CLAIMS), "its statements are those of an orbit")
+    data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"] - 0
+    see(claims == ["exists", *(c for c in CLAIMS if c in claims)], "it states what an orbit is")
     printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
-    scene, z = Link(data, [*printed, ball(s)]).proved().orbits(0)
+    scene, z = (box := Link(data, [*printed, ball(s)]).proved()).orbits(0)
     for value, near, r in zip(z, printed, radius, strict=True):
         see(r - abs(value - near), "it lies in the box around the printed joints")
     for k, text in enumerate(data["enclosure"]):
@@ -128,10 +133,9 @@ def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     see("unstable" not in claims or -min(jury, key=float), "a multiplier is outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
-    discs = [acb(ball(disc["re"]), ball(disc["im"])) for disc in data["multipliers"]]
-    pairs = zip(discs, found, strict=bool(discs))
-    see(all(disc.contains(mu) for disc, mu in pairs), "the multipliers lie in their discs", False)
-    return [*claims, *["multipliers"] * bool(discs)], [data["params"], (scene, z)]
+    for d, mu in zip(discs := data["multipliers"], found, strict=bool(discs)):
+        see(len(d) == 2 and acb(ball(d["re"]), ball(d["im"])).contains(mu), "its disc", False)
+    return claims + ["multipliers"] * bool(discs), [data["params"], [(scene, z)], [box]]
 
 
-CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}
+CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}  # each reads all

@@ -108,12 +108,34 @@ def test_two_parts_of_a_file_are_not_the_same() -> None:
     later["segments"] = [*part["segments"][1:], part["segments"][0]]
     later["radius"] = [1e-9] * len(later["joints"])
     later["enclosure"] = [f"{c!r} +/- 1e-9" for c in later["joints"]]
-    for again in (part, later, part | {"kind": "SN", "parameter": "S"}, other):
+    for again in (part, later, other):
         assert check_text(json.dumps(again)).yes
         text = json.dumps({"certificate": "diagram", "format": 1, "checkable": [part, again]})
         answer = check_text(text)
         assert answer.yes == (again is other), answer
-        assert answer.yes or answer.why == "false: no two parts are the same"
+        assert answer.yes or answer.why == "false: no two parts are the same, or overlap"
+
+
+def test_what_nobody_looks_at_is_not_in_a_file() -> None:
+    """Not a name that the checker does not read, and no claim with a value of its own."""
+    data = json.loads(certificate(0))
+    disc, *others = data["multipliers"]
+    wrong = [
+        {"signature": "7b"},
+        {"stable": False},
+        {"parameter": "Omega"},
+        {"multipliers": [disc | {"abs": "2"}, *others]},
+        {"params": data["params"] | {"g": 9.81}},
+        {"statements": dict.fromkeys(data["statements"], False)},
+        {"statements": ["exists", "stable", "stable"]},
+        {"statements": ["unique"]},
+        {"statements": "exists"},
+    ]
+    for change in wrong:
+        assert check_text(json.dumps(data)).yes
+        assert not check_text(json.dumps(data | change)).yes, change
+    for name in data:
+        assert not check_text(json.dumps({k: v for k, v in data.items() if k != name})).yes
 
 
 @pytest.mark.slow
@@ -210,6 +232,10 @@ def test_other_models_have_no_file(tmp_path: Path) -> None:
     found = cf.find_orbit("dead-band")
     with pytest.raises(cf.ParameterError, match="the checker knows"):
         found.certify().save(tmp_path / "a.json")
+    path = tmp_path / "b.json"  # of a diagram of such a model
+    path.write_text(json.dumps({"certificate": "diagram", "format": 1, "checkable": []}, indent=1))
+    assert not verify(path).yes
+    assert "holds nothing that is checked" in verify(path).why
 
 
 def test_without_flint_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

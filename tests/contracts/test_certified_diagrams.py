@@ -8,19 +8,24 @@ import sys
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
-from contfric.certify import files
+from contfric.certify import events, files
 from contfric.certify.diagram_certificate import (
     DiagramCertificate,
     Gap,
     load_diagram_certificate,
     merged,
 )
+from contfric.certify.events import certify_event
 from contfric.cli import main
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
 from contfric.study import read_study, run_study
 
 STUDY = """
@@ -77,6 +82,29 @@ def test_a_time_limit_is_named() -> None:
     assert "time limit" in str(found)
     with pytest.raises(cf.ParameterError, match="time_limit"):
         diagram().certify(time_limit=-1)
+
+
+def test_an_event_ends_at_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever it comes: no orbit is evaluated after it, and no inequality."""
+    event = next(b for b in diagram().bifurcations if b.kind is cf.Kind.SN)
+    evaluations: list[Any] = []
+
+    def clock() -> float:
+        return float(len(evaluations))
+
+    def counted(*args: Any) -> BallModel:
+        evaluations.append(args)
+        return ball_model(*args)
+
+    monkeypatch.setattr(events, "time", SimpleNamespace(time=clock))
+    monkeypatch.setattr(events, "ball_model", counted)
+    assert certify_event(event, "Omega").proved
+    whole = len(evaluations)
+    for limit in range(whole):
+        evaluations.clear()
+        found = certify_event(event, "Omega", until=limit)
+        assert found.ended and events.LATE in found.why
+        assert len(evaluations) == limit + 1
 
 
 @pytest.mark.parametrize("kind", [ProcessPoolExecutor, ThreadPoolExecutor])
@@ -142,7 +170,7 @@ def test_an_event_that_the_checker_refuses_is_said_and_not_in_the_file(
     """Where two events happen at once a file of one would be refused, and all that stands next to it."""
     orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
     branch = cf.continue_orbit(orbit, "Omega", (0.538, 0.545))
-    proofs = [branch.bifurcations[0].certify(), orbit.certify()]
+    proofs: list[Any] = [branch.bifurcations[0].certify(), orbit.certify()]
     assert [part["certificate"] for part in files.checkable(proofs)] == ["event", "orbit"]
     own = files.event_data
     monkeypatch.setattr(files, "event_data", lambda proof: own(proof) | {"kind": "PD"})

@@ -97,6 +97,17 @@ def test_files_of_events(tmp_path: Path) -> None:
     assert not check_text(json.dumps(nested)).yes
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_nobody_looks_at_is_not_in_the_file_of_an_event(kind: str) -> None:
+    """Another value of the parameter, say, next to the one that is proved."""
+    data = json.loads(files()[kind])
+    for params in ({data["parameter"]: 0.777}, {data["parameter"]: data["knots"][0][-1]}):
+        assert not check_text(json.dumps(data | {"params": data["params"] | params})).yes
+    assert not check_text(json.dumps(data | {"label": "SN_1a"})).yes
+    for other in {"CS", "SS", "SN", "BP", "PD", "NS", "AS", "GS", "T"} - {kind}:
+        assert not check_text(json.dumps(data | {"kind": other})).yes, other
+
+
 def test_a_load_is_no_multiplier() -> None:
     data = json.loads(files()["BP"])
     data |= {"kind": "CS", "at": [-1, 0]}
@@ -144,7 +155,7 @@ def test_the_file_of_a_branch_holds_its_orbits_and_events(tmp_path: Path) -> Non
 
 
 def test_a_file_of_an_older_format_is_to_be_written_anew() -> None:
-    data = json.loads(files()["AS"]) | {"format": 1}
+    data = json.loads(files()["AS"]) | {"format": 2}
     answer = check_text(json.dumps(data))
     assert not answer.yes
-    assert "format 2" in answer.why
+    assert "format 3" in answer.why

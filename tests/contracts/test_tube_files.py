@@ -65,7 +65,56 @@ def test_a_tube_is_not_stated_twice() -> None:
     assert is_verified(data | back)
     for other in ({}, back):
         parts = {"certificate": "diagram", "format": 1, "checkable": [data, data | other]}
-        assert check_text(json.dumps(parts)).why == "false: no two parts are the same"
+        assert check_text(json.dumps(parts)).why == "false: no two parts are the same, or overlap"
+
+
+def _part(data: dict[str, Any], first: int, last: int) -> dict[str, Any]:
+    """Return the tube between two knots."""
+    ends = [
+        end if k == n else None
+        for end, k, n in zip(data["ends"], (first, last), (0, len(data["knots"]) - 1), strict=True)
+    ]
+    events = [[k - first, kind] for k, kind in data["events"] if first <= k < last]
+    return data | {"knots": data["knots"][first : last + 1], "ends": ends, "events": events}
+
+
+def _later(data: dict[str, Any], turn: float) -> dict[str, Any]:
+    """Return a tube from its second joint on, its orbits so many turns of the phase later."""
+    knots = []
+    for *joints, value in data["knots"]:
+        later = [*joints[2:], joints[0] + 2 * math.pi / value, joints[1]]
+        shift = turn * 2 * math.pi / value
+        knots.append([c + shift if k % 2 == 0 else c for k, c in enumerate(later)] + [value])
+    return data | {"knots": knots, "segments": [*data["segments"][1:], data["segments"][0]]}
+
+
+def test_tubes_do_not_overlap() -> None:
+    """A part of one that is in another states its events and orbits again."""
+    data = fold()
+    middle, _ = data["events"][0]
+    for begins, ends in ((middle, middle + 1), (middle - 1, middle + 2), (middle + 2, middle + 1)):
+        first, other = _part(data, middle - 3, ends), _part(data, begins, middle + 4)
+        for parts in ([first, other], [_later(other, 3), first]):
+            file = {"certificate": "diagram", "format": 1, "checkable": parts}
+            answer = check_text(json.dumps(file))
+            assert answer.yes == (begins > ends), (begins, ends, answer)
+            assert answer.yes or answer.why == "false: no two parts are the same, or overlap"
+
+
+def test_a_symmetric_tube_and_its_whole_period_are_the_same() -> None:
+    data = _part(json.loads(tube("0s", 0.55, 0.4, 0.56)), 3, 6)
+    mirrored = {"slide+": "slide-", "slide-": "slide+", "F+": "F-", "F-": "F+"}
+    whole = [[mirrored.get(name, name) for name in pair] for pair in data["segments"]]
+    knots = []
+    for *joints, value in _part(data, 1, 3)["knots"]:
+        half = math.pi / value
+        other = [-c if k % 2 else c + half for k, c in enumerate(joints)]
+        knots.append([*joints, *other, value])
+    again = data | {"half": False, "segments": [*data["segments"], *whole], "knots": knots}
+    assert data["half"] and is_verified(again)
+    for parts in ([data, again], [again, data]):
+        file = {"certificate": "diagram", "format": 1, "checkable": parts}
+        assert check_text(json.dumps(file)).why == "false: no two parts are the same, or overlap"
 
 
 @pytest.mark.parametrize(
@@ -211,6 +260,8 @@ WRONG: dict[str, Callable[[dict[str, Any]], None]] = {
     "NaN for h": _param("h", math.nan),
     "an infinite knot": lambda data: data["knots"][3].__setitem__(1, math.inf),
     "knots of other parameters": _from_another_parameter,
+    "another name": _set("label", "1a"),
+    "a second value of the parameter": _param("Omega", 0.54),
     "no numbers": lambda data: data["knots"][3].__setitem__(0, "1"),
 }
 
@@ -295,7 +346,7 @@ def test_a_tube_goes_round_a_closed_curve_once(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(tube_file, "_kept", lambda branch: (branch.arc[0], branch.arc[-1]))
     (again,) = tubes_of(proof)  # its last point is beyond its first one
     assert data["knots"][:-1] == again["knots"][: len(data["knots"]) - 1]
-    assert check_text(json.dumps(again)).why == "false: the first orbit does not come again"
+    assert check_text(json.dumps(again)).why == "false: no orbit comes again"
     turns = {"knots": [*again["knots"][-8:], *again["knots"][1:]], "events": again["events"]}
     assert not is_verified(again | turns)
 

@@ -307,3 +307,29 @@ def test_where_equations_are_singular_all_along_few_boxes_are_tried() -> None:
     pieces = [piece for k in range(len(branch) - 1) for piece in tracer.step(k)[0]]
     assert tracer.ended == "" and not any(piece.proved for piece in pieces)
     assert tracer.count < 40 * len(branch)
+
+
+def test_a_branch_is_covered_towards_an_end_that_is_not_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Only next to the end, where the equations may be singular, is nothing proved."""
+    orbit = cf.solve_orbit("coulomb", "0s", SCENE | {"Omega": 0.57})
+    branch = cf.continue_orbit(orbit, "Omega", (0.56, 0.58))
+    exact, last = Tracer._exact, len(branch) - 1
+
+    def not_at_ends(self: Tracer, k: int, printed: Vector, plane: Vector) -> Vector | None:
+        return None if k in (0, last) else exact(self, k, printed, plane)
+
+    monkeypatch.setattr(Tracer, "_exact", not_at_ends)
+    found = certify_branch(branch)
+    gaps = [piece for piece in found.pieces if not piece.proved]
+    assert [(piece.start, piece.stop) for piece in gaps] == [
+        (branch.arc[0], gaps[0].stop),
+        (gaps[1].start, branch.arc[-1]),
+    ]
+    for gap, step in zip(
+        gaps, (branch.arc[1] - branch.arc[0], branch.arc[-1] - branch.arc[-2]), strict=True
+    ):
+        assert gap.stop - gap.start < 1e-3 * step
+    proved = [piece for piece in found.pieces if piece.proved]
+    assert all(piece.linked for piece in proved[1:])

@@ -182,6 +182,7 @@ def _row(form: AffineForm, n: int, frequencies: tuple[Any, ...]) -> list[Any]:
     return row
 
 
+@lru_cache(maxsize=128)  # Newton's method for an event asks at every step
 def _differentiated(affine: AffineModel, symbol: Any) -> AffineModel:
     def derivative(group: dict[str, list[list[Any]]]) -> dict[str, list[list[Any]]]:
         return {
