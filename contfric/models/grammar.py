@@ -311,8 +311,7 @@ class Scope(Generic[T]):
 
     def _call(self, name: str, arguments: list[ast.expr]) -> T:
         if name == "where":
-            yes, no = self.evaluate(arguments[1]), self.evaluate(arguments[2])
-            return self._branch(arguments[0], yes, no)
+            return self._branch(arguments[0], *map(self.evaluate, arguments[1:]))
         if name in ("abs", "sign"):
             return of_product(self, self.algebra.functions[name], arguments[0])
         values: list[Any] = [self.evaluate(argument) for argument in arguments]
