@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from contfric.base.kept import altered
@@ -41,6 +43,8 @@ _FALLEN = 1e-2
 #: A function of the multipliers that changes by more than the second share of its change over a step, over
 #: the first share of the step, is rounding; the longest step over which that is asked.
 _NUDGE, _ERRATIC, _SHORT = 1e-3, 0.1, 1e-3
+#: Share of the way from one change of a label to the next at which the other labels are asked.
+_BESIDE = 0.01
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -207,25 +211,68 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
     At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.
     """
     found: list[Located] = []
-    active = orbit.model.index_of(settings.parameter)
-    for k in range(len(before.labels)):
-        if before.labels[k] == after.labels[k]:
-            continue
-        locations = locate_label(orbit, before, after, settings, k)
-        if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
-            locations.pop()
-        if not locations and not (
-            _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
-        ):
-            found.append(not_located(orbit, Kind.T, before, after, settings))
-        for point in locations:
-            here = point.orbit(orbit.system, orbit.vector, active)
-            if here.margins.min(initial=0.0) < -_OUTSIDE:
-                continue  # where curves cross a trial may lie on another one
-            test = EventFunction(*_label_location(orbit, k))
-            b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
-            found.append((b, point))
+    for k in np.flatnonzero(before.labels != after.labels).tolist():
+        found += _changes(orbit, before, after, settings, k)
+    found += _undone(orbit, before, after, settings, found)
     return _once(found) if orbit.model.joined else found
+
+
+def _changes(
+    orbit: Orbit, before: Point, after: Point, settings: Settings, k: int
+) -> list[Located]:
+    """Return the changes of one label between two points at which it differs."""
+    found: list[Located] = []
+    active = orbit.model.index_of(settings.parameter)
+    locations = locate_label(orbit, before, after, settings, k)
+    if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
+        locations.pop()
+    if not locations and not (
+        _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
+    ):
+        found.append(not_located(orbit, Kind.T, before, after, settings))
+    for point in locations:
+        here = point.orbit(orbit.system, orbit.vector, active)
+        if here.margins.min(initial=0.0) < -_OUTSIDE:
+            continue  # where curves cross a trial may lie on another one
+        test = EventFunction(*_label_location(orbit, k))
+        b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
+        found.append((b, point))
+    return found
+
+
+def _undone(
+    orbit: Orbit, before: Point, after: Point, settings: Settings, others: list[Located]
+) -> list[Located]:
+    """Return the changes of labels that are the same at both ends of a step in which others change.
+
+    One touch may go from segment to segment: what it changes in one of them is undone soon. So labels are
+    asked on both sides of the changes that are known.
+    """
+    from contfric.continuation.bracket import BY_PARAMETER
+
+    found: list[Located] = []
+    known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
+    for one, other in pairwise([before, *known, after] if known else []):
+        if other.arc - one.arc < SAME_TANGENCY or one.value == other.value:
+            continue
+        for share in (_BESIDE, 1.0 - _BESIDE):
+            value = one.value + share * (other.value - one.value)
+            beside = locate_change(orbit, one, other, settings, BY_PARAMETER, 0, value)
+            if beside is None or beside.lost:
+                continue
+            same = (before.labels == after.labels) & (beside.labels != before.labels)
+            for k in np.flatnonzero(same).tolist():
+                changes = [
+                    *_changes(orbit, before, beside, settings, k),
+                    *_changes(orbit, beside, after, settings, k),
+                ]
+                found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
+    return found
+
+
+def _apart(one: Located, other: Located) -> bool:
+    """Tell whether two changes of labels are at two locations."""
+    return one[0].located and abs(one[1].arc - other[1].arc) > SAME_TANGENCY
 
 
 def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) -> bool:

@@ -1,0 +1,41 @@
+"""Tangencies T of which several lie within one step, and one undoes another: found from any step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import contfric as cf
+
+#: Two masses with friction, a friction element between them and a spring beyond a gap.
+_STRUCTURE = {
+    "mass": [1.0, 1.5],
+    "damping": "c",
+    "stiffness": [[2.0, -1.0], [-1.0, 2.0]],
+    "force": {"q1": "F*cos(w*t)"},
+    "contacts": {
+        "pad": {"kind": "friction", "velocity": "v2", "kinetic": "mu", "static": "1.1*mu"},
+        "iwan": {"kind": "jenkins", "displacement": "q1 - q2", "stiffness": "kd", "limit": "S"},
+        "stop": {"kind": "spring", "gap": "d - q1", "stiffness": "kg"},
+    },
+    "parameters": {
+        **{"w": 0.845, "F": 1.0, "mu": 0.3, "kd": 0.8, "S": 0.2, "c": 0.04, "d": 0.6, "kg": 10.0}
+    },
+    "period": "2*pi/w",
+}
+
+
+def test_tangencies_do_not_depend_on_the_step() -> None:
+    structure = dict(_STRUCTURE)
+    matrices = [structure.pop(name) for name in ("mass", "damping", "stiffness")]
+    model = cf.Mechanism(*matrices, **structure, coordinates=["q1", "q2"])
+    orbit = cf.find_orbit(model)
+    fine = cf.continue_orbit(orbit, "w", (0.7, 2.2), max_step=2e-4)
+    wanted = [e.params["w"] for e in fine.bifurcations if e.kind is cf.Kind.T]
+    gaps = np.diff(wanted)
+    assert len(wanted) == 4 and np.min(gaps) < 1e-4
+    rng = np.random.default_rng(1)
+    for step in 10.0 ** rng.uniform(-3.5, -1.0, 6):
+        branch = cf.continue_orbit(orbit, "w", (0.7, 2.2), max_step=float(step))
+        found = [e.params["w"] for e in branch.bifurcations if e.kind is cf.Kind.T]
+        assert len(found) == len(wanted), step
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10)
