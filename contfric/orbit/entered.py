@@ -47,15 +47,24 @@ class StartState:
 
     @cached_property
     def heights(self) -> dict[str, float]:
-        """How far the state is above each surface."""
-        surfaces, view = self.model.surfaces, self._view
-        seen = {s.observable: 0.0 for s in surfaces}
-        seen = {name: view.observe(name, self.t, self.y) for name in seen}
-        return {s.name: seen[s.observable] - view.level(s.name) for s in surfaces}
+        """How far the state is above each surface that there is by now."""
+        return {surface.name: self._height(surface) for surface in self.model.surfaces}
+
+    @cached_property
+    def _values(self) -> dict[str, float]:
+        return {}
 
     @cached_property
     def _terms(self) -> dict[str, float]:
         return {}
+
+    def _height(self, surface: Surface) -> float:
+        """Return how far the state is above a surface, one of a mode that was visited just now, too."""
+        found = self._values.get(surface.observable)
+        if found is None:
+            found = self._view.observe(surface.observable, self.t, self.y)
+            self._values[surface.observable] = found
+        return found - self._view.level(surface.name)
 
     @cached_property
     def _widths(self) -> FloatArray:
@@ -78,7 +87,8 @@ class StartState:
 
     def lies_on(self, name: str) -> bool:
         """Tell whether the state lies on a surface, but for rounding."""
-        return abs(self.heights[name]) <= _ON * self._size(self.model.surface_by_name[name])
+        surface = self.model.surface_by_name[name]
+        return abs(self._height(surface)) <= _ON * self._size(surface)
 
     def side_ahead(self, mode: str, name: str) -> int:
         """Return the side of a surface that the solution of a mode leads to; 0 if it stays on it."""

@@ -312,7 +312,7 @@ surfaces: {threshold: {observable: x, level: ET}}
 modes: {free: {in: {threshold: -}, field: {x: x*(1 - y), y: y*(0.6*x - 0.4)}}}
 resets: {threshold: {x: (1 - p)*x}}
 """
-    with pytest.raises(cf.ConvergenceError, match="goes on in 'free'"):
+    with pytest.raises(cf.ConvergenceError, match="stays in 'free'"):
         cf.find_orbit(model_of(tmp_path, text), state=[0.5, 0.8])
 
 
