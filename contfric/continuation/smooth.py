@@ -246,17 +246,21 @@ def _undone(
     """Return the changes of labels that are the same at both ends of a step in which others change.
 
     One touch may go from segment to segment: what it changes in one of them is undone soon. So labels are
-    asked on both sides of the changes that are known.
+    asked on both sides of the changes that are known, first by the tangent, which is near enough there.
     """
     from contfric.continuation.bracket import BY_PARAMETER
 
     found: list[Located] = []
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
-    for one, other in pairwise([before, *known, after] if known else []):
+    for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
         if other.arc - one.arc < SAME_TANGENCY or one.value == other.value:
             continue
-        for share in (_BESIDE, 1.0 - _BESIDE):
-            value = one.value + share * (other.value - one.value)
+        sides = [(one, _BESIDE)] * near + [(other, -_BESIDE)] * far
+        for point, share in sides:
+            asked = _along(orbit, point, share * (other.arc - one.arc), settings).labels
+            if not ((before.labels == after.labels) & (asked != before.labels)).any():
+                continue
+            value = point.value + share * (other.value - one.value)
             beside = locate_change(orbit, one, other, settings, BY_PARAMETER, 0, value)
             if beside is None or beside.lost:
                 continue
@@ -268,6 +272,14 @@ def _undone(
                 ]
                 found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
     return found
+
+
+def _along(orbit: Orbit, point: Point, distance: float, settings: Settings) -> Orbit:
+    """Return the orbit at a distance along the tangent of a point, not solved."""
+    here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    vector = here.vector.copy()
+    vector[orbit.model.index_of(settings.parameter)] += distance * point.slope
+    return altered(here, joints=here.joints + distance * point.tangent, vector=vector)
 
 
 def _apart(one: Located, other: Located) -> bool:
