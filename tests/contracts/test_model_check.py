@@ -328,3 +328,29 @@ def test_sizes_and_times_that_are_far_apart_are_told(tmp_path: Path) -> None:
     fast = APART.replace("- x,", "- 1.0e+9*x,").replace("q: x - q", "q: 1.0e+9*(x - q)")
     (times,) = findings(tmp_path, fast.replace("- 2*x", "- 1.0e+9*x"), Topic.SCALES)
     assert "Write units: {x: 1.0e-09" in times
+
+
+@pytest.mark.parametrize("level", [-0.3, 0.2])
+@pytest.mark.parametrize("side", ["+", "-"])
+def test_a_slide_that_meets_a_surface_with_no_mode_behind_it(
+    tmp_path: Path, side: str, level: float
+) -> None:
+    """It goes on beyond the surface, where its mode does not hold; a mode on both sides is sound."""
+    text = """\
+name: checked
+states: [x, v]
+parameters: {w: 1.0, F: 3.0, S: 1.0}
+period: 2*pi/w
+observables: {u: x - F*cos(w*t)}
+surfaces: {F+: {observable: u, level: S}, F-: {observable: u, level: -S}, v: {observable: v, level: 0},
+  gate: {observable: x + u, level: LEVEL}}
+field: {x: v, v: -u - S*sign(v)}
+modes:
+  forward: {in: {v: +}}
+  backward: {in: {v: -}}
+  stick: {in: {v: 0, F+: -, F-: +, gate: SIDE}, field: {x: 0, v: 0}}
+""".replace("LEVEL", str(level))
+    found = report_of(tmp_path, text.replace("SIDE", f"'{side}'"))
+    assert any("a slide in 'stick' meets 'gate'" in f.message for f in found.findings)
+    both = report_of(tmp_path, text.replace(", gate: SIDE", ""))
+    assert not any("a slide in" in f.message for f in both.findings)

@@ -59,6 +59,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.passages import check_passages
     from contfric.models.check.probe import Probe
     from contfric.models.check.scales import check_reached, check_scales
+    from contfric.models.check.slides import check_slides
     from contfric.models.check.structure import (
         check_angles,
         check_period,
@@ -79,6 +80,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)
+    check_slides(report, probe)
     check_passages(report, probe)
     check_reached(report, probe)
     check_resets(report, probe)
