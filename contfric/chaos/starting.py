@@ -7,7 +7,7 @@ from contfric.orbit.ahead import side_ahead, size_of
 
 #: A state lies on a surface within this share of what its observable is summed up from, as in
 #: :mod:`contfric.orbit.entered`.
-_ON = 1e-12
+_ON = 16.0 * 2.0**-52
 
 
 @helper

@@ -20,12 +20,18 @@ _MOVED = 2e-14
 
 @helper
 def size_of(functions, observable, surface, t, y, widths, p, workspace):  # type: ignore[no-untyped-def]
-    """Return what the height over a surface is summed up from; ``widths`` is added to the states' sizes."""
-    slopes = workspace.slopes
+    """Return what the height over a surface is summed up from.
+
+    ``widths`` is added to the states' sizes, but no more than 1 + the largest of these: near a resonance
+    solutions may grow a thousand times larger.
+    """
+    slopes, largest = workspace.slopes, 1.0
+    for j in range(y.shape[0]):
+        largest = max(largest, 1.0 + abs(y[j]))
     functions.observe(observable, t, y, p, workspace.none, slopes)
     size = abs(functions.level(surface, p, workspace.none, workspace.empty)) + abs(slopes[0] * t)
     for j in range(y.shape[0]):
-        size += abs(slopes[1 + j]) * (abs(y[j]) + abs(widths[j]))
+        size += abs(slopes[1 + j]) * (abs(y[j]) + min(abs(widths[j]), largest))
     return size
 
 

@@ -24,9 +24,10 @@ from contfric.models.view import FlowView
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.time_scale import clock_period, time_scale
 
-#: A state lies on a surface within this share of what its observable is summed up from: Newton's method
-#: leaves some hundred roundings of a joint, an integrated flow its tolerance; two events differ by far more.
-_ON = 1e-12
+#: A state lies on a surface within this share of what its observable is summed up from: what evaluating it
+#: may be off by. Nearer than that its sides are rounding; farther away they are what was given, even if the
+#: surface is met in no time.
+_ON = 16.0 * float(np.finfo(float).eps)
 #: Shares of a period after which it is asked to which side an observable has moved, and the change that
 #: counts, against the same: a hundred roundings. Steps are as short as the change allows.
 _STEPS, _MOVED = tuple(10.0**k for k in range(-8, -2)), 2e-14
@@ -68,9 +69,15 @@ class StartState:
 
     @cached_property
     def _widths(self) -> FloatArray:
-        """How large the time and the states are, or are where a solution moves."""
-        spread = _spread(self.model, self.vector.tobytes())
-        return np.array([abs(self.t), *(np.abs(self.y) + spread).tolist()])
+        """How large the time and the states are, or are where a solution moves.
+
+        Not more than 1 + the largest state: near a resonance solutions may grow a thousand times larger.
+        """
+        sizes = np.abs(self.y)
+        spread = np.minimum(
+            _spread(self.model, self.vector.tobytes()), 1.0 + sizes.max(initial=0.0)
+        )
+        return np.array([abs(self.t), *(sizes + spread).tolist()])
 
     @cached_property
     def _unit(self) -> float:
