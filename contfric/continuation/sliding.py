@@ -25,9 +25,6 @@ _TOGETHER = 1e-9
 #: well behind it. Nearer ones are located: where orbits shrink to a point, Newton's method may find another
 #: curve there (the parameter was off by 5e-6, with 2 % of the other margin's change left).
 _BEHIND = 0.1
-#: A margin of which less than this share of its change over a step (or of 1) is left at the first event
-#: vanishes with it: by its secant it is a part in 1e9 of the step from there, which no diagram tells apart.
-_WITH = 1e-9
 #: Newton may fail right after an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
@@ -102,7 +99,6 @@ def _first_located(
 
     What comes first ends the branch; what vanishes with it is of its group. They are asked in the order of
     their secants: one that is still positive where another vanishes vanishes behind it, and is not located.
-    Nor is one that vanishes there too, as that of the mirror image of a stop does.
     """
     from contfric.continuation.bracket import BY_TEST
 
@@ -115,10 +111,8 @@ def _first_located(
     best: tuple[float, int, Point] | None = None
     for k in sorted(share, key=share.__getitem__):
         change = float(before.tests[k] - after.tests[k])
-        if best is not None and not best[2].lost:
-            left = float(best[2].tests[k])
-            if left > _BEHIND * change or abs(left) < _WITH * min(change, 1.0):
-                continue
+        if best is not None and not best[2].lost and best[2].tests[k] > _BEHIND * change:
+            continue
         point = locate_change(orbit, before, after, settings, BY_TEST, k)
         if point is not None and (best is None or (point.arc, k) < best[:2]):
             best = point.arc, k, point
