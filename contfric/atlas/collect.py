@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
 from contfric.atlas.matching import ROUNDING, same_event, same_location, telling_kind
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import (
     TERMINAL,

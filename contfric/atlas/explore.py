@@ -19,7 +19,7 @@ from contfric.atlas.follow import follow
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
 from contfric.atlas.short_branches import begins_at_short
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason

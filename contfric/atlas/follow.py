@@ -35,7 +35,7 @@ from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
 from contfric.continuation.events import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
-from contfric.continuation.from_simulation import walked
+from contfric.continuation.from_simulation import solutions_near
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.partial_touches import partial_touches
 from contfric.continuation.points import Settings, next_to
@@ -154,7 +154,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
     asked: list[Branch] = []
-    for found in walked(orbit.as_whole(), shifts):
+    for found in solutions_near(orbit.as_whole(), shifts):
         guess = replace(found, vector=orbit.vector)
         itinerary = canonical_itinerary(guess.itinerary, orbit.model)
         if itinerary in done:

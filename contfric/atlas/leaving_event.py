@@ -12,7 +12,7 @@ from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.lines import ways_in_plane
 from contfric.atlas.matching import SAME_SOLUTION
 from contfric.atlas.several_locations import opening_together
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions

@@ -194,14 +194,7 @@ def _fill_check(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("model", metavar="MODEL", nargs="?", help="name or YAML file of a model")
     add("--model", dest="also_model", metavar="MODEL", help="the same, as other commands take it")
-    add(
-        *("-p", "--param"),
-        dest="params",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="check it at this value of a parameter",
-    )
+    _add_params(parser, "check it at this value of a parameter")
     add("--json", action="store_true", help="print everything as JSON")
 
 
@@ -215,7 +208,7 @@ def _fill_graph(parser: argparse.ArgumentParser) -> None:
 def _fill_simulate(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
-    add("-p", dest="params", metavar="NAME=VALUE", action="append", default=[], help=_PARAMETER)
+    _add_params(parser)
     add(
         "--state",
         metavar="X,V",
@@ -237,14 +230,7 @@ def _fill_census(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("old_model", metavar="MODEL", nargs="?", help=argparse.SUPPRESS)  # as it was
     add("--model", default=DEFAULT_MODEL, help="name or YAML file of the model (%(default)s)")
-    add(
-        *("-p", "--param"),
-        dest="params",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help=_PARAMETER,
-    )
+    _add_params(parser)
     add("--periods", type=_count, default=2, help="largest number of periods (%(default)s)")
     add("--stops", type=_count, default=6, help="largest number of stops, v = 0 (%(default)s)")
     add(
@@ -256,6 +242,13 @@ def _fill_census(parser: argparse.ArgumentParser) -> None:
     add("--seed", type=int, default=0, help="shifts the grids of starts (%(default)s)")
     add("--json", action="store_true", help="print everything as JSON")
     add("--quiet", action="store_true", help="no progress")
+
+
+def _add_params(parser: argparse.ArgumentParser, what: str = _PARAMETER) -> None:
+    names = "-p", "--param"
+    parser.add_argument(
+        *names, dest="params", metavar="NAME=VALUE", action="append", default=[], help=what
+    )
 
 
 def _number(text: str) -> float:

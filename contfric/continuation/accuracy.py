@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.base.kept import altered, cached_property
+from contfric.base.attributes import altered, cached_property
 from contfric.continuation.doubling_point import opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient

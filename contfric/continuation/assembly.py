@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
 from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind

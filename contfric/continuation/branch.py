@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
-from contfric.base.kept import altered
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
 from contfric.continuation.events import Bifurcation, End, Kind

@@ -114,8 +114,8 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
             f"segment {i + 1} leaves {surface} and comes back, and does not touch it between"
         )
     other, back = _there_and_back(model, mode, surface)
-    beside = {i - 1: touch[0] - orbit.begins[i, 0], i + 1: orbit.ends[i, 0] - touch[0]}
-    for k, away in ((k % len(orbit.itinerary), away) for k, away in beside.items()):
+    gaps = {i - 1: touch[0] - orbit.begins[i, 0], i + 1: orbit.ends[i, 0] - touch[0]}
+    for k, away in ((k % len(orbit.itinerary), away) for k, away in gaps.items()):
         if away < _NO_LENGTH and orbit.itinerary[k] == (other, back) and not _lasts(orbit, k):
             raise NotationError(
                 f"the change in segment {k + 1}, of no time, is at this touch of {surface}"

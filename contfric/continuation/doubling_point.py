@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.along_curve import Line
 from contfric.orbit.linear import pencil_of_turn
 from contfric.orbit.orbit import Orbit, Status

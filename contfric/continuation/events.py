@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import TYPE_CHECKING
 
+from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
-from contfric.base.kept import altered
 from contfric.continuation.measured_event import MeasuredEvent
 from contfric.continuation.touching import chosen_at, entered_at, thrown_at
 from contfric.errors import ParameterError, did_you_mean
@@ -22,7 +22,7 @@ from contfric.orbit.system import EventFunction
 from contfric.remember.stored import made_of
 
 if not TYPE_CHECKING:
-    from contfric.base.kept import cached_property
+    from contfric.base.attributes import cached_property
 if TYPE_CHECKING:
     from functools import cached_property
 
@@ -328,14 +328,14 @@ def _is_rested_on(model: Model, surface: str) -> bool:
     return model.rests_on(surface)
 
 
-class Told:
+class LateText:
     """A text of a data class, given as it is or as what returns it, which is called when it is asked for."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
 
     def __get__(self, instance: object, owner: type) -> str:
-        """Return the text; the default of the class is none."""
+        """Return the text; the default of the class is empty."""
         if instance is None:
             return ""
         own = vars(instance)
@@ -352,7 +352,7 @@ class End:
     """Why a branch ends, with the event if there is one."""
 
     reason: EndReason
-    message: Told = Told()
+    message: LateText = LateText()
     bifurcation: Bifurcation | None = field(default=None, repr=False)
 
     def __str__(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.crossing import crossing_between
 from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Bifurcation, Kind

@@ -35,7 +35,7 @@ _PLACES = np.array([0.17, 0.26, 0.37, 0.44, 0.52, 0.61, 0.70, 0.79])
 _LEFT = 1e-9
 
 
-def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
+def solutions_near(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
     """Yield orbits, not solved, with the itineraries of solutions near an orbit over one turn.
 
     The same itinerary may come again, as a guess from a solution farther away.
@@ -43,11 +43,11 @@ def walked(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator
     Parameters
     ----------
     orbit : the orbit at the event, on its whole cycle
-    shifts : (parameter, change) of further motions, from the orbit itself at other parameters
+    shifts : (parameter, change) of further solutions, from the orbit itself at other parameters
     """
     own, seen = canonical_itinerary(orbit.itinerary, orbit.model), set()
     start = _inside(orbit)
-    for size, vector, state in _beside(orbit, start[1], shifts):
+    for size, vector, state in _starts_near(orbit, start[1], shifts):
         found = _one_turn(orbit, start, vector, state)
         if found is None:
             continue
@@ -80,7 +80,7 @@ def _inside(orbit: Orbit) -> tuple[int, float]:
     return i, float(times[best])
 
 
-def _beside(
+def _starts_near(
     orbit: Orbit, time: float, shifts: tuple[tuple[int, float], ...]
 ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
     """Yield the distance, the parameters and the state of motions near an orbit, the nearest first."""

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.locations import TANGENTIAL, locations_of, normal_location
@@ -42,7 +42,7 @@ from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
 from contfric.orbit.system import EventFunction, Itinerary, Margin, build_system
-from contfric.signature.edits import edited_pieces, walked
+from contfric.signature.edits import checked_itinerary, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
 _VANISHES = 1e-9
@@ -290,7 +290,7 @@ def edited_whole(
         speeds |= outcome.away
     pieces = edited_pieces(orbit.itinerary, edit)
     origins = [origin for origin, _ in pieces]
-    itinerary = walked(orbit.itinerary, pieces, orbit.model)
+    itinerary = checked_itinerary(orbit.itinerary, pieces, orbit.model)
     itinerary = _crossing_as_before(orbit, itinerary, origins)
     starts = np.array([joints[o] if o in joints else orbit.cycle[o[0]] for o in origins])
     kept = np.zeros(len(orbit.itinerary)) if away is None else away

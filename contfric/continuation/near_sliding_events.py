@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.side import first_point, point_before
 from contfric.models.definition import FloatArray

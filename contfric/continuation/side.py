@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.base.tally import tally
 from contfric.continuation.events import Bifurcation, End
 from contfric.continuation.points import SMALLEST_STEP, Point, PointRows, Settings

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.continuum import LEVEL
 from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Bifurcation, Kind
@@ -44,7 +44,7 @@ _FALLEN = 1e-2
 #: the first share of the step, is rounding; the longest step over which that is asked.
 _NUDGE, _ERRATIC, _SHORT = 1e-3, 0.1, 1e-3
 #: Share of the way from one change of a label to the next at which the other labels are asked.
-_BESIDE = 0.01
+_NEARBY = 0.01
 #: Imaginary part from which a pair of multipliers on the unit circle counts as complex.
 _COMPLEX = 1e-6
 
@@ -255,20 +255,20 @@ def _undone(
     for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
         if other.arc - one.arc < SAME_TANGENCY or one.value == other.value:
             continue
-        sides = [(one, _BESIDE)] * near + [(other, -_BESIDE)] * far
+        sides = [(one, _NEARBY)] * near + [(other, -_NEARBY)] * far
         for point, share in sides:
             asked = _along(orbit, point, share * (other.arc - one.arc), settings).labels
             if not ((before.labels == after.labels) & (asked != before.labels)).any():
                 continue
             value = point.value + share * (other.value - one.value)
-            beside = locate_change(orbit, one, other, settings, BY_PARAMETER, 0, value)
-            if beside is None or beside.lost:
+            nearby = locate_change(orbit, one, other, settings, BY_PARAMETER, 0, value)
+            if nearby is None or nearby.lost:
                 continue
-            same = (before.labels == after.labels) & (beside.labels != before.labels)
+            same = (before.labels == after.labels) & (nearby.labels != before.labels)
             for k in np.flatnonzero(same).tolist():
                 changes = [
-                    *_changes(orbit, before, beside, settings, k),
-                    *_changes(orbit, beside, after, settings, k),
+                    *_changes(orbit, before, nearby, settings, k),
+                    *_changes(orbit, nearby, after, settings, k),
                 ]
                 found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
     return found

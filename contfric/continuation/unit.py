@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.base.kept import cached_property
+from contfric.base.attributes import cached_property
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.clock import clocked

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.base.kept import altered
+from contfric.base.attributes import altered
 from contfric.continuation.doubling_point import EVEN, NEARLY, solved_at_vertex
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.kept import cached_property
+from contfric.base.attributes import cached_property
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from contfric.base.shown import Shown
 
 if not TYPE_CHECKING:
-    from contfric.base.kept import cached_property
+    from contfric.base.attributes import cached_property
 if TYPE_CHECKING:
     from functools import cached_property
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
-from contfric.base.kept import altered
 from contfric.base.renamed import renamed
 from contfric.base.tabled import as_table
 from contfric.base.tally import tally
@@ -28,7 +28,7 @@ from contfric.orbit.system import Itinerary, System, build_system
 from contfric.signature import Signature
 
 if not TYPE_CHECKING:
-    from contfric.base.kept import cached_property
+    from contfric.base.attributes import cached_property
 if TYPE_CHECKING:
     from functools import cached_property
     from pathlib import Path

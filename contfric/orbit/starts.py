@@ -215,8 +215,8 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
     Raises
     ------
     ParameterError
-        If it is no state of the model, or none is given and none is found; and where the period of the
-        excitation is none.
+        If it is not a state of the model, or none is given and none is found; or if the period of the
+        excitation is not positive and finite.
     """
     period = model.view(vector).period
     if not (model.autonomous or 0.0 < period < np.inf):

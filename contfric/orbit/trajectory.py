@@ -269,6 +269,20 @@ def after_impact(  # type: ignore[no-untyped-def]
 
 
 @helper
+def after_stretch(functions, tables, mode, t, y, p, carry, workspace):  # type: ignore[no-untyped-def]
+    """Return the mode after some time in which nothing was met: in a chatter, which flight it is in.
+
+    The impacts that follow are another segment: a mode of chatter begins after an impact.
+    """
+    wall = int(carry[BOUNCED]) - 1
+    chatters = tables.flights[mode] >= 0 and wall >= 0
+    if not (chatters and in_flight(functions, tables, mode, wall, t, y, p, workspace)):
+        return mode
+    carry[BOUNCED] = 0.0
+    return flight_of(functions, tables, mode, wall, t, y, p, workspace)
+
+
+@helper
 def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, workspace):  # type: ignore[no-untyped-def]
     """Follow a trajectory; see :func:`simulate`."""
     none, nothing, after = workspace.none, workspace.nothing, workspace.after
@@ -296,12 +310,7 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
         turns, t = whole_turns(t + tau, period)
         cycle += turns
         if surface < 0:
-            wall = int(carry[BOUNCED]) - 1
-            # the impacts that follow are another segment: a mode of chatter begins after an impact
-            chatters = tables.flights[mode] >= 0 and wall >= 0
-            if chatters and in_flight(functions, tables, mode, wall, t, y, p, workspace):
-                carry[BOUNCED] = 0.0
-                mode = flight_of(functions, tables, mode, wall, t, y, p, workspace)
+            mode = after_stretch(functions, tables, mode, t, y, p, carry, workspace)
             if left > stretch:
                 continue
             return ALL_TIME, event, mode, cycle, t

@@ -201,7 +201,7 @@ def axes_or_new(ax: Axes | None, width: float = 7.0, height: float = 4.3) -> Axe
 
 
 def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
-    """Return the figure given, or a new one of pyplot; ParameterError if it is none."""
+    """Return the figure given, or a new one of pyplot; ParameterError if it is something else."""
     if fig is not None:
         if not hasattr(fig, "add_subplot"):
             raise ParameterError(f"fig is a figure of matplotlib, got {fig!r}")

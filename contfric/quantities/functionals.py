@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from contfric.base.kept import cached_property
+from contfric.base.attributes import cached_property
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray
 from contfric.models.quantity_texts import WORK, Functional

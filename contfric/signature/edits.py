@@ -96,10 +96,10 @@ def apply_edit(itinerary: Sequence[ReducedPair], edit: Edit, model: Model) -> Re
     NotationError
         If the graph has no such walk.
     """
-    return walked(itinerary, edited_pieces(itinerary, edit), model)
+    return checked_itinerary(itinerary, edited_pieces(itinerary, edit), model)
 
 
-def walked(
+def checked_itinerary(
     itinerary: Sequence[ReducedPair],
     pieces: Sequence[tuple[tuple[int, int], ReducedPair]],
     model: Model,

@@ -48,7 +48,7 @@ def check_text(text: str) -> Answer:
 
 
 def _apart(orbit: Any, box: Link) -> bool:
-    """Tell whether an orbit is none of a box."""
+    """Tell whether an orbit is not one of those in a box."""
     return any(all(orbit[0].misses(orbit[1], box.orbits(s)) for s in parts) for parts in PARTS)
 
 

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import pytest
 
 import contfric as cf
-from contfric.base.kept import altered, cached_property
+from contfric.base.attributes import altered, cached_property
 from contfric.continuation.events import End, EndReason
 from contfric.orbit.index import opening_sign, opening_signs
 
