@@ -72,6 +72,10 @@ class Arc:
         found[self.active] = self.parameter(x)
         return found
 
+    def at(self, place: CurvePoint) -> tuple[FloatArray, FloatArray]:
+        """Return state and parameters of a point of the curve."""
+        return self.state(place.x), self.parameters(place.x)
+
     def unknowns(self, y: FloatArray, value: float) -> FloatArray:
         """Return the scaled unknowns of a state and a parameter."""
         return np.append(y / self.scale, value / self.width)

@@ -19,7 +19,7 @@ for modes on surfaces that were typed, and is what decides here; the product is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -48,19 +48,20 @@ class Partner:
     Attributes
     ----------
     unfolding : what happens
-    region, place : the other mode and the point of its curve, directed into its region; None without one
+    start : the curve of the other mode and its point there, directed into its region; None without one
+    mode : name of the other mode; empty without one
     product : the number whose sign decides; nan where the surface has no field on its other side
     """
 
     unfolding: Unfolding
-    region: ModeRegion | None = None
-    place: CurvePoint | None = None
+    start: tuple[Arc, CurvePoint] | None = None
+    mode: str = ""
     product: float = float("nan")
 
 
-def partner_of(arc: Arc, place: CurvePoint, surface: str) -> Partner:
+def partner_of(arc: Arc, place: CurvePoint) -> Partner:
     """Return what meets an equilibrium on a surface; its branch arrives there along its tangent."""
-    y, p = arc.state(place.x), arc.parameters(place.x)
+    y, p = arc.at(place)
     others = [
         r for r in regions_of(arc.region.model) if r is not arc.region and _rests(r, arc, y, p)
     ]
@@ -69,14 +70,14 @@ def partner_of(arc: Arc, place: CurvePoint, surface: str) -> Partner:
     if len(others) > 1 or len(arc.region.touched(y, p)) > 1:
         return Partner(Unfolding.DEGENERATE)
     region = others[0]
-    product = product_of(arc.region, region, surface, y, p)
-    beside = Arc(region, arc.vector, arc.active, arc.scale, arc.width)
+    product = product_of(arc.region, region, y, p)
+    beside = replace(arc, region=region)
     inwards = _inwards(beside, y, arc.parameter(place.x))
     if inwards is None:
         return Partner(Unfolding.DEGENERATE, product=product)
     onwards = inwards.tangent[-1] * place.tangent[-1] > 0.0
     unfolding = Unfolding.PERSISTENCE if onwards else Unfolding.FOLD
-    return Partner(unfolding, region, inwards, product)
+    return Partner(unfolding, (beside, inwards), region.mode, product)
 
 
 def _rests(region: ModeRegion, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
@@ -93,7 +94,7 @@ def _inwards(arc: Arc, y: FloatArray, value: float) -> CurvePoint | None:
     place = arc.start(y, value, 1.0)
     if place is None:
         return None
-    touched = arc.region.touched(arc.state(place.x), arc.parameters(place.x))
+    touched = arc.region.touched(*arc.at(place))
     if len(touched) != 1:
         return None
     domain, _ = arc.region.domain_of(y, arc.parameters(place.x))
@@ -114,9 +115,7 @@ def height_rate(arc: Arc, place: CurvePoint, surface: str) -> float:
     return float((heights[0] - heights[1]) / (2.0 * short))
 
 
-def product_of(
-    one: ModeRegion, other: ModeRegion, surface: str, y: FloatArray, p: FloatArray
-) -> float:
+def product_of(one: ModeRegion, other: ModeRegion, y: FloatArray, p: FloatArray) -> float:
     """Return the number whose sign tells persistence from a non-smooth fold; nan where it has no meaning.
 
     ``det N2 / det N1`` of two modes that move, ``-C N^{-1} E`` of one that moves and one that slides:

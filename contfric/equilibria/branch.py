@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
+from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.regions import ModeRegion
-from contfric.equilibria.result import Equilibrium, Location
+from contfric.equilibria.result import Equilibrium
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import FloatArray, Model
 
@@ -79,13 +80,9 @@ class EquilibriumBranch(Tabled):
     def __getitem__(self, index: int) -> Equilibrium:
         vector = self.vector.copy()
         vector[self.model.index_of(self.parameter)] = self.values[index]
-        own, region = self.eigenvalues[index], self.regions[index]
-        own = own[~np.isnan(own.real)]
-        wrong = region.domain_of(self.states[index], vector)[1]
-        location = Location.VIRTUAL if wrong else Location.ADMISSIBLE
-        if not wrong and region.touched(self.states[index], vector):
-            location = Location.BOUNDARY
-        return Equilibrium(region, vector, self.states[index], own, location, wrong)
+        own = self.eigenvalues[index]
+        known = own[~np.isnan(own.real)]
+        return equilibrium_at(self.regions[index], self.states[index], vector, known)
 
     @property
     def modes(self) -> list[str]:

@@ -8,7 +8,13 @@ import numpy as np
 
 from contfric.equilibria.newton import Zeros
 from contfric.equilibria.regions import ModeRegion, check_no_excitation, regions_of, scale_of
-from contfric.equilibria.result import Equilibria, Equilibrium, EquilibriumSet, Location
+from contfric.equilibria.result import (
+    ComplexArray,
+    Equilibria,
+    Equilibrium,
+    EquilibriumSet,
+    Location,
+)
 from contfric.equilibria.sets import followed, holds_state, set_of_plane, sets_of_line
 from contfric.errors import whole_number
 from contfric.models import ModelSource, Parameters
@@ -127,10 +133,13 @@ def _unwound(model: Model, y: FloatArray) -> FloatArray:
     return found
 
 
-def equilibrium_at(region: ModeRegion, y: FloatArray, p: FloatArray) -> Equilibrium:
-    """Return a zero of a region's field as a result: where it lies, and its eigenvalues."""
+def equilibrium_at(
+    region: ModeRegion, y: FloatArray, p: FloatArray, known: ComplexArray | None = None
+) -> Equilibrium:
+    """Return a zero of a region's field as a result: where it lies, and its eigenvalues if not known."""
     _, wrong = region.domain_of(y, p)
     location = Location.VIRTUAL if wrong else Location.ADMISSIBLE
     if not wrong and region.touched(y, p):
         location = Location.BOUNDARY
-    return Equilibrium(region, p, y, region.eigenvalues(y, p), location, wrong)
+    own = region.eigenvalues(y, p) if known is None else known
+    return Equilibrium(region, p, y, own, location, wrong)

@@ -70,8 +70,8 @@ def is_oscillating(eigenvalues: ComplexArray, k: int) -> bool:
 
 def centre_of(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> Centre:
     """Return the centre subspace and the normal form of a Hopf point."""
-    fields, pull = region.fields, 1.0
-    a = fields.jacobian(y, p, pull)
+    fields = region.fields
+    a = fields.jacobian(y, p)
     values, vectors = np.linalg.eig(a)
     k = _critical(values, region.eigenvalues(y, p))
     omega, q = float(values[k].imag), vectors[:, k] / np.linalg.norm(vectors[:, k])
@@ -80,19 +80,19 @@ def centre_of(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> 
     r = r / np.vdot(q, r)  # <r, q> = 1, as vdot conjugates its first argument
 
     def b(u: ComplexArray, v: ComplexArray) -> ComplexArray:
-        return np.asarray(fields.second(y, p, pull, u, v))
+        return np.asarray(fields.second(y, p, u, v))
 
     conj, one = q.conj(), np.eye(len(y))
     steady = np.asarray(np.linalg.solve(a, b(q, conj)), dtype=np.complex128)
     doubled = np.asarray(np.linalg.solve(2j * omega * one - a, b(q, q)), dtype=np.complex128)
-    third = np.asarray(fields.third(y, p, pull, q, q, conj))
+    third = np.asarray(fields.third(y, p, q, q, conj))
     left = r.conj()
     terms = np.array([left @ third, -2.0 * (left @ b(q, steady)), left @ b(conj, doubled)])
     lyapunov = float(np.sum(terms).real) / (2.0 * omega)
     if abs(lyapunov) * 2.0 * omega <= _CANCELLED * float(np.sum(np.abs(terms))):
         lyapunov = 0.0
-    drift = np.asarray(-np.linalg.solve(a, fields.slope(y, p, active, pull)), dtype=np.float64)
-    turned = b(q, drift.astype(np.complex128)) + fields.mixed(y, p, active, pull, q)
+    drift = np.asarray(-np.linalg.solve(a, fields.slope(y, p, active)), dtype=np.float64)
+    turned = b(q, drift.astype(np.complex128)) + fields.mixed(y, p, active, q)
     return Centre(omega, q, lyapunov, float((left @ turned).real), drift)
 
 

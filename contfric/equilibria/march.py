@@ -10,6 +10,7 @@ import numpy as np
 
 from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.branch import BranchEnd
+from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.hopf import is_oscillating
 
 #: Steps in the scaled product: the first, the shortest, and how a step that turned little grows.
@@ -53,12 +54,18 @@ class MarchLimits:
 
 @dataclass(eq=False)
 class Run:
-    """The points of a march in one region, the events among them and its end."""
+    """The points of a march in one region, the events among them and its end.
+
+    Attributes
+    ----------
+    events : the crossings as results, filled by who follows a branch
+    """
 
     arc: Arc
     places: list[CurvePoint] = field(default_factory=list)
     crossings: list[LocatedSignChange] = field(default_factory=list)
     end: BranchEnd = BranchEnd.POINTS
+    events: list[EquilibriumEvent] = field(default_factory=list)
 
 
 def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
@@ -154,7 +161,7 @@ def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSi
 
 
 def _eigenvalues(arc: Arc, place: CurvePoint) -> np.ndarray:
-    return np.asarray(arc.region.eigenvalues(arc.state(place.x), arc.parameters(place.x)))
+    return np.asarray(arc.region.eigenvalues(*arc.at(place)))
 
 
 def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignChange]:
@@ -183,7 +190,7 @@ def _tests(arc: Arc, before: CurvePoint) -> Iterator[tuple[str, Callable[[CurveP
     yield "SN", lambda at: float(at.tangent[-1])
     yield "BP", arc.orientation
     region = arc.region
-    domain, _ = region.domain_of(arc.state(before.x), arc.parameters(before.x))
+    domain, _ = region.domain_of(*arc.at(before))
     for name in region.sides(domain):
         if region.bounds(domain, name):
             k = region.heights.names.index(name)
@@ -191,16 +198,12 @@ def _tests(arc: Arc, before: CurvePoint) -> Iterator[tuple[str, Callable[[CurveP
 
 
 def _height(arc: Arc, k: int, at: CurvePoint) -> float:
-    return float(arc.region.heights.value(arc.state(at.x), arc.parameters(at.x))[k])
+    return float(arc.region.heights.value(*arc.at(at))[k])
 
 
 def _leaves(arc: Arc, crossing: LocatedSignChange) -> bool:
     """Tell whether an equilibrium leaves the region of its mode at an event."""
     if crossing.test in ("SN", "BP", "H"):
         return False
-    inside = [not _wrong(arc, place) for place in (crossing.before, crossing.after)]
-    return inside[0] and not inside[1]
-
-
-def _wrong(arc: Arc, place: CurvePoint) -> tuple[str, ...]:
-    return arc.region.domain_of(arc.state(place.x), arc.parameters(place.x))[1]
+    outside = [arc.region.domain_of(*arc.at(p))[1] for p in (crossing.before, crossing.after)]
+    return not outside[0] and bool(outside[1])

@@ -30,21 +30,16 @@ class Heights:
     Attributes
     ----------
     names : surfaces in the order of the model, then the observables of kinks
+    value : function of (y, p): all heights, shape (surfaces + kinks,)
     """
 
     names: tuple[str, ...]
-    _values: Callable[..., Any]
-    _slopes: Callable[..., Any]
-
-    def value(self, y: FloatArray, p: FloatArray) -> FloatArray:
-        """Return all heights, shape (surfaces + kinks,)."""
-        with np.errstate(all="ignore"):
-            return np.array(self._values(y, p), dtype=np.float64)
+    value: Callable[[FloatArray, FloatArray], FloatArray]
+    _slopes: Callable[[FloatArray, FloatArray], FloatArray]
 
     def slopes(self, y: FloatArray, p: FloatArray) -> FloatArray:
         """Return their gradients by the states, shape (surfaces + kinks, n)."""
-        with np.errstate(all="ignore"):
-            return np.array(self._slopes(y, p), dtype=np.float64).reshape(len(self.names), -1)
+        return self._slopes(y, p).reshape(len(self.names), -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,11 +161,9 @@ def regions_of(model: Model) -> tuple[ModeRegion, ...]:
     description = from_text(model.definition)
     formulas = Formulas(description)
     still = {formulas.t: sympy.Integer(0)}
-    observables = dict(
-        zip((o.name for o in description.observables), formulas.observables(), strict=True)
-    )
-    levels = dict(zip((s.name for s in description.surfaces), formulas.levels(), strict=True))
-    above = {s.name: observables[s.observable] - levels[s.name] for s in model.surfaces}
+    heights_of, seen = formulas.heights(), (o.name for o in description.observables)
+    observables = dict(zip(seen, formulas.observables(), strict=True))
+    above = {s.name: heights_of[s.name] for s in model.surfaces}
     above |= {name: observables[name] for name in description.kinks}
     above = {name: formula.xreplace(still) for name, formula in above.items()}
     args, texts = [list(formulas.y), list(formulas.p)], list(above.values())

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.equilibria.arc import Arc, CurvePoint
-from contfric.equilibria.boundary import Partner, Unfolding, partner_of
+from contfric.equilibria.boundary import Partner, partner_of
 from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, EquilibriumKind, HopfPoint
 from contfric.equilibria.find import equilibrium_at
@@ -87,10 +87,10 @@ def continue_equilibrium(
     )
     scale = scale_of(model, equilibrium.vector)
     arc = Arc(equilibrium.region, equilibrium.vector, active, scale, limits.high - limits.low)
-    halves: list[list[_Leg]] = []
+    halves: list[list[Run]] = []
     for sign in (-1.0, 1.0):
         start = arc.start(equilibrium.state, float(equilibrium.vector[active]), sign)
-        closed = bool(halves and halves[0]) and halves[0][-1].run.end is BranchEnd.CLOSED
+        closed = bool(halves and halves[0]) and halves[0][-1].end is BranchEnd.CLOSED
         if start is None or closed:  # one half of a closed branch is all of it
             halves.append([])
         else:
@@ -118,44 +118,29 @@ def _limits(
     )
 
 
-class _Leg:
-    """A run in one region with its events as results."""
-
-    def __init__(self, run: Run, events: list[EquilibriumEvent]) -> None:
-        self.run, self.events = run, events
-
-
-def _followed(arc: Arc, start: CurvePoint, limits: MarchLimits) -> list[_Leg]:
+def _followed(arc: Arc, start: CurvePoint, limits: MarchLimits) -> list[Run]:
     """Follow a curve from region to region."""
-    legs: list[_Leg] = []
+    runs: list[Run] = []
     left = limits.max_points
     for _ in range(_MOST_RUNS):
         run = march(arc, start, replace(limits, max_points=left))
         left -= len(run.places)
         partner: Partner | None = None
-        events: list[EquilibriumEvent] = []
         for crossing in run.crossings:
             if _is_at_limit(arc, crossing.place, limits):
                 run.end = BranchEnd.LIMIT if run.end is BranchEnd.BOUNDARY else run.end
                 continue
             found, partner = _event(arc, crossing)
-            events += [] if found is None else [found]
-        legs.append(_Leg(run, events))
-        goes_on = run.end is BranchEnd.BOUNDARY and partner is not None
-        if (
-            not goes_on
-            or partner is None
-            or partner.region is None
-            or partner.place is None
-            or left < 2
-        ):
+            run.events += [] if found is None else [found]
+        runs.append(run)
+        beyond = partner.start if partner is not None and run.end is BranchEnd.BOUNDARY else None
+        if beyond is None or left < 2:
             break
-        if len(legs) > 1 and _is_start(legs[0], partner):
+        if len(runs) > 1 and _is_start(runs[0], *beyond):
             run.end = BranchEnd.CLOSED
             break
-        arc = Arc(partner.region, arc.vector, arc.active, arc.scale, arc.width)
-        start = partner.place
-    return legs
+        arc, start = beyond
+    return runs
 
 
 def _is_at_limit(arc: Arc, place: CurvePoint, limits: MarchLimits) -> bool:
@@ -165,18 +150,16 @@ def _is_at_limit(arc: Arc, place: CurvePoint, limits: MarchLimits) -> bool:
     return below or (limits.high_end is BranchEnd.LIMIT and limits.high - value < near)
 
 
-def _is_start(first: _Leg, partner: Partner) -> bool:
-    """Tell whether a branch comes back to the boundary that its first leg left by."""
-    assert partner.place is not None
-    at = first.run.places[-1].x
-    again = first.run.arc.region is partner.region
-    return again and bool(np.max(np.abs(at - partner.place.x)) < 1e-9)
+def _is_start(first: Run, arc: Arc, place: CurvePoint) -> bool:
+    """Tell whether a branch comes back to the boundary that its first run left by."""
+    again = first.arc.region is arc.region
+    return again and bool(np.max(np.abs(first.places[-1].x - place.x)) < 1e-9)
 
 
 def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | None, Partner | None]:
     """Return an event as a result, and what meets the branch there; None where nothing happens."""
     place = crossing.place
-    y, p = arc.state(place.x), arc.parameters(place.x)
+    y, p = arc.at(place)
     at = equilibrium_at(arc.region, y, p)
     parameter = arc.region.model.parameter_names[arc.active]
     before, after = (_stable(arc, side) for side in (crossing.before, crossing.after))
@@ -189,62 +172,51 @@ def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | No
         return HopfPoint(EquilibriumKind.H, *common, centre_of(arc.region, y, p, arc.active)), None
     if arc.region.domain_of(y, p)[1]:
         return None, None  # still virtual on both sides
-    partner = partner_of(arc, place, crossing.test)
-    if (
-        partner.region is not None
-        and partner.place is not None
-        and partner.unfolding is not Unfolding.DEGENERATE
-    ):
-        beside = Arc(partner.region, arc.vector, arc.active, arc.scale, arc.width)
-        after = _stable(beside, partner.place)
-    name = "" if partner.region is None else partner.region.mode
+    partner = partner_of(arc, place)
+    if partner.start is not None:
+        after = _stable(*partner.start)
     event = BoundaryPoint(
         EquilibriumKind.BE,
         *common[:3],
         after,
         crossing.test,
         partner.unfolding,
-        name,
+        partner.mode,
         partner.product,
     )
     return event, partner
 
 
 def _stable(arc: Arc, place: CurvePoint) -> bool | None:
-    return equilibrium_at(arc.region, arc.state(place.x), arc.parameters(place.x)).stable
+    return equilibrium_at(arc.region, *arc.at(place)).stable
 
 
 def _branch(
-    start: Equilibrium, parameter: str, down: list[_Leg], up: list[_Leg]
+    start: Equilibrium, parameter: str, down: list[Run], up: list[Run]
 ) -> EquilibriumBranch:
     """Return both halves as one branch, from the end of the first to the end of the second."""
     n = len(start.state)
-    points = [(leg.run.arc, place) for leg in down for place in leg.run.places][::-1]
-    events = [_reversed(event) for leg in down for event in leg.events][::-1]
-    later = [(leg.run.arc, place) for leg in up for place in leg.run.places]
+    points = [(run.arc, place) for run in down for place in run.places][::-1]
+    events = [_reversed(event) for run in down for event in run.events][::-1]
+    later = [(run.arc, place) for run in up for place in run.places]
     points += later[1:] if points else later
-    events += [event for leg in up for event in leg.events]
-    values, states, own = [], [], np.full((len(points), n), np.nan, dtype=np.complex128)
-    admissible = []
-    for k, (arc, place) in enumerate(points):
-        y, p = arc.state(place.x), arc.parameters(place.x)
-        values.append(arc.parameter(place.x))
-        states.append(y)
-        found = arc.region.eigenvalues(y, p)
-        own[k, : len(found)] = found
-        admissible.append(not arc.region.domain_of(y, p)[1])
-    ends = [legs[-1].run.end if legs else BranchEnd.LOST for legs in (down, up)]
+    events += [event for run in up for event in run.events]
+    found = [equilibrium_at(arc.region, *arc.at(place)) for arc, place in points]
+    own = np.full((len(points), n), np.nan, dtype=np.complex128)
+    for k, equilibrium in enumerate(found):
+        own[k, : len(equilibrium.eigenvalues)] = equilibrium.eigenvalues
+    ends = [runs[-1].end if runs else BranchEnd.LOST for runs in (down, up)]
     if down and ends[0] is BranchEnd.CLOSED and not up:
         ends[1] = BranchEnd.CLOSED
     return EquilibriumBranch(
         start.model,
         parameter,
         start.vector,
-        np.array(values),
-        np.array(states).reshape(-1, n),
+        np.array([arc.parameter(place.x) for arc, place in points]),
+        np.array([equilibrium.state for equilibrium in found]).reshape(-1, n),
         own,
         tuple(arc.region for arc, _ in points),
-        np.array(admissible, dtype=bool),
+        np.array([not equilibrium.violated for equilibrium in found], dtype=bool),
         tuple(events),
         (ends[0], ends[1]),
     )

@@ -149,11 +149,10 @@ class _Wall:
         self._formulas, self.surface, self.flight = formulas, surface, flight
         self.side = flight.sides[surface]
         [own] = [s for s in description.surfaces if s.name == surface]
-        c = [o.name for o in description.observables].index(own.observable)
         field = formulas.fields()[[m.name for m in description.modes].index(flight.name)]
-        gap = formulas.observables()[c]
-        self._rate = self._along(gap, field)
-        self.lift = sympy.simplify(self._along(self._rate, field))
+        height = formulas.heights()[surface]
+        self._rate = formulas.rate(height, field)
+        self.lift = sympy.simplify(formulas.rate(self._rate, field))
         self._image = formulas.resets()[description.surfaces.index(own)]
         slopes = [self._rate.diff(s) for s in formulas.y]
         changes = [
@@ -171,7 +170,7 @@ class _Wall:
         self.field = [
             sympy.simplify(f - self.lift * d) for f, d in zip(field, direction, strict=True)
         ]
-        self._check(gap - formulas.levels()[description.surfaces.index(own)], column)
+        self._check(height, column)
         known = dict(zip(formulas.y, description.states, strict=True))
         known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
         self._named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
@@ -180,12 +179,6 @@ class _Wall:
         """Refuse flights on both sides whose contacts are not the same."""
         if not all(vanishes(a - b) for a, b in zip(self.field, other.field, strict=True)):
             raise self._refused("at rest on it the fields of both sides do not agree")
-
-    def _along(self, formula: Any, field: list[Any]) -> Any:
-        states = zip(self._formulas.y, field, strict=True)
-        return sympy.expand_mul(formula.diff(self._formulas.t)) + sum(
-            formula.diff(s) * f for s, f in states
-        )
 
     def _check(self, above: Any, column: int) -> None:
         """Refuse a reset that is no impact: it moves states at rest on the wall, or takes others off it."""

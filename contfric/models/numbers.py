@@ -30,16 +30,22 @@ _OWN = {
 }
 
 
-def function_of_numbers(arguments: Sequence[Any], formulas: Any) -> Callable[..., Any]:
-    """Return formulas as a function of numbers; ``arguments`` are symbols or lists of them.
+def function_of_numbers(arguments: Sequence[Any], formulas: Any) -> Callable[..., np.ndarray]:
+    """Return formulas as a function of numbers whose values are an array; nan or inf where they have none.
+
+    ``arguments`` are symbols or lists of them.
 
     Examples
     --------
     >>> x = sympy.Symbol("x")
-    >>> [float(value) for value in function_of_numbers([x], [x**2, sympy.cos(x)])(0.0)]
+    >>> function_of_numbers([x], [x**2, sympy.cos(x)])(0.0).tolist()
     [0.0, 1.0]
     """
-    found: Callable[..., Any] = sympy.lambdify(
-        list(arguments), formulas, modules=[_OWN, "numpy"], cse=True
-    )
-    return found
+    evaluate = sympy.lambdify(list(arguments), formulas, modules=[_OWN, "numpy"], cse=True)
+
+    def values(*numbers: Any) -> np.ndarray:
+        with np.errstate(all="ignore"):
+            found = np.array(evaluate(*numbers))
+        return found.astype(np.result_type(found, np.float64), copy=False)
+
+    return values

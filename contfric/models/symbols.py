@@ -56,6 +56,13 @@ class Formulas:
             self.read(("surfaces", s.name, "level"), s.level) for s in self.description.surfaces
         ]
 
+    def heights(self) -> dict[str, Any]:
+        """Return the height above each surface: its observable less its level."""
+        names = (o.name for o in self.description.observables)
+        seen = dict(zip(names, self.observables(), strict=True))
+        pairs = zip(self.description.surfaces, self.levels(), strict=True)
+        return {surface.name: seen[surface.observable] - level for surface, level in pairs}
+
     def period(self) -> Any:
         """Return the period, or 0."""
         return self.read(("period",), self.description.period or "0")
@@ -65,16 +72,15 @@ class Formulas:
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
-        found, moving = [], (self.t, *self.y)
+        found, moving, heights = [], (self.t, *self.y), self.heights()
         for mode, bits in itertools.product(self.description.modes, self.pieces):
             signs = {
                 observables[name]: bit
                 for name, bit in zip(self.description.kinks, bits, strict=True)
             }
             known = known_sides(mode, self.surfaces)
-            for surface, level in zip(self.description.surfaces, self.levels(), strict=True):
-                side = known.get(surface.name, 0)
-                above = observables[surface.observable] - level
+            for name, above in heights.items():
+                side = known.get(name, 0)
                 if side != 0 and not above.is_number:
                     signs[above] = side
             found.append(
@@ -114,38 +120,25 @@ class Formulas:
             tuple(1 if piece >> k & 1 else -1 for k in range(count)) for piece in range(1 << count)
         ]
 
+    def rate(self, formula: Any, field: Sequence[Any]) -> Any:
+        """Return the rate of a formula of time and states along a field."""
+        pairs = zip(self.y, field, strict=True)
+        return sympy.expand_mul(formula.diff(self.t)) + sum(formula.diff(s) * f for s, f in pairs)
+
     def rates(self) -> list[list[Any]]:
         """Return the rate of each observable along each piece of each mode."""
-        return [
-            [
-                sympy.expand_mul(o.diff(self.t))
-                + sum(o.diff(s) * f for s, f in zip(self.y, field, strict=True))
-                for o in self.observables()
-            ]
-            for field in self.fields()
-        ]
+        return [[self.rate(o, field) for o in self.observables()] for field in self.fields()]
 
     def projections(self) -> list[list[Any]]:
         """Return the state on the surfaces that each mode moves on, near a state: one Newton step.
 
         A mode that slides forgets what its start has off its surfaces.
         """
-        observables = dict(
-            zip((o.name for o in self.description.observables), self.observables(), strict=True)
-        )
-        found = []
+        found, heights = [], self.heights()
         for mode in self.description.modes:
-            on = [
-                observables[surface.observable] - level
-                for surface, level in zip(self.description.surfaces, self.levels(), strict=True)
-                if mode.sides.get(surface.name) == 0
-            ]
-            state = list(self.y)
-            if on:  # all at once: surfaces need not be at right angles
-                slopes = sympy.Matrix([[above.diff(s) for s in self.y] for above in on])
-                back = slopes.T * (slopes * slopes.T).inv() * sympy.Matrix(on)
-                state = [s - b for s, b in zip(state, back, strict=True)]
-            found.append([sympy.expand(s) for s in state])
+            on = [above for name, above in heights.items() if mode.sides.get(name) == 0]
+            pairs = zip(self.y, step_off(on, self.y), strict=True)
+            found.append([sympy.expand(s - b) for s, b in pairs])
         return found
 
     def scales(self) -> list[Any]:
@@ -193,6 +186,17 @@ class Formulas:
                 ]
             )
         return found
+
+
+def step_off(heights: Sequence[Any], states: Sequence[Any]) -> list[Any]:
+    """Return how far states lie off the surfaces on which some heights vanish, to first order.
+
+    All at once, the shortest way: surfaces need not be at right angles.
+    """
+    if not heights:
+        return [sympy.Integer(0)] * len(states)
+    slopes = sympy.Matrix([[above.diff(s) for s in states] for above in heights])
+    return list(slopes.T * (slopes * slopes.T).inv() * sympy.Matrix(heights))
 
 
 def moves_in_closed_form(description: Description, forms: Sequence[object]) -> bool:

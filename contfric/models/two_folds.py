@@ -186,9 +186,9 @@ class _Tangencies:
     surface: str
     above: str
     below: str
-    equations: Callable[..., Any]
-    slopes: Callable[..., Any]
-    curvatures: Callable[..., Any]
+    equations: Callable[..., FloatArray]
+    slopes: Callable[..., FloatArray]
+    curvatures: Callable[..., FloatArray]
     identical: bool
 
     @classmethod
@@ -201,20 +201,12 @@ class _Tangencies:
         description = from_text(model.definition)
         formulas, fields = _formulas(description)
         names = [mode.name for mode in description.modes]
-        levels = dict(zip((s.name for s in description.surfaces), formulas.levels(), strict=True))
-        observables = dict(
-            zip((o.name for o in description.observables), formulas.observables(), strict=True)
-        )
-        height = observables[model.surface_by_name[surface].observable] - levels[surface]
+        height = formulas.heights()[surface]
         pieces = len(formulas.pieces)
         own = [fields[names.index(mode) * pieces] for mode in (above, below)]
 
-        def rate(formula: Any, field: list[Any]) -> Any:
-            pairs = zip(formulas.y, field, strict=True)
-            return formula.diff(formulas.t) + sum(formula.diff(s) * f for s, f in pairs)
-
-        rates = [rate(height, field) for field in own]
-        second = [rate(r, field) for r, field in zip(rates, own, strict=True)]
+        rates = [formulas.rate(height, field) for field in own]
+        second = [formulas.rate(r, field) for r, field in zip(rates, own, strict=True)]
         unknowns = [formulas.t, *formulas.y]
         args = [unknowns, list(formulas.p)]
         equations = [height, *rates]
@@ -232,8 +224,7 @@ class _Tangencies:
 
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Return the derivatives of the equations by (t, y), shape (3, 1 + n)."""
-        with np.errstate(all="ignore"):
-            found = np.array(self.slopes(z, self.vector), dtype=np.float64)
+        found = self.slopes(z, self.vector)
         if self.model.autonomous:
             found[:, 0] = 0.0
         return found
@@ -241,8 +232,7 @@ class _Tangencies:
     def newton(self, z: FloatArray, sizes: FloatArray) -> FloatArray | None:
         """Return the solution that the shortest steps lead to from (t, y), or None."""
         for _ in range(_STEPS):
-            with np.errstate(all="ignore"):
-                value = np.array(self.equations(z, self.vector), dtype=np.float64)
+            value = self.equations(z, self.vector)
             slopes = self.jacobian(z) * sizes
             if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(value))):
                 return None

@@ -97,15 +97,8 @@ def affine_model(definition: str) -> AffineModel:
     fields = {}
     for mode, rates in zip(description.modes, formulas.fields(), strict=True):
         fields[mode.name] = _affine(formulas, rates, f"mode {mode.name}", name)
-    observables = dict(
-        zip((o.name for o in description.observables), formulas.observables(), strict=True)
-    )
-    surfaces = {
-        surface.name: _affine(
-            formulas, [observables[surface.observable] - level], surface.name, name
-        )
-        for surface, level in zip(description.surfaces, formulas.levels(), strict=True)
-    }
+    heights = formulas.heights().items()
+    surfaces = {surface: _affine(formulas, [above], surface, name) for surface, above in heights}
     resets = {
         surface.name: _affine(formulas, image, f"the reset at {surface.name}", name)
         for surface, image in zip(description.surfaces, formulas.resets(), strict=True)
