@@ -33,7 +33,6 @@ from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import defaults
 from contfric.models.formulas import vanishes
-from contfric.models.functions import as_text
 from contfric.models.sections import joined_modes
 from contfric.models.symbols import Formulas
 
@@ -77,14 +76,14 @@ def chatter_parts(
                 )
         sides: dict[str, int | str] = {}
         for lift, way in zip(lifts, ways, strict=True):
-            found["observables"][lift] = way.text(way.lift)
+            found["observables"][lift] = formulas.text(way.lift)
             found["surfaces"][lift] = {"observable": lift, "level": "0"}
             sides |= {s: side for s, side in way.flight.sides.items() if s != description.phase}
             sides[lift] = "-" if way.side > 0 else "+"
         ways[0].check_same(ways[-1])
         found["modes"][name] = {
             "in": {**sides, surface: 0},
-            "field": dict(zip(description.states, map(ways[0].text, ways[0].field), strict=True)),
+            "field": dict(zip(description.states, map(formulas.text, ways[0].field), strict=True)),
             "rank": len(description.states) - 2,
         }
         chatters[surface] = {"mode": name, "flight": ways[0].flight.name, "lift": lifts[0]}
@@ -171,9 +170,6 @@ class _Wall:
             sympy.simplify(f - self.lift * d) for f, d in zip(field, direction, strict=True)
         ]
         self._check(height, column)
-        known = dict(zip(formulas.y, description.states, strict=True))
-        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
-        self._named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
 
     def check_same(self, other: _Wall) -> None:
         """Refuse flights on both sides whose contacts are not the same."""
@@ -214,7 +210,3 @@ class _Wall:
             ("resets", self.surface, CHATTER),
             f"the reset at '{self.surface}' is no impact that can chatter: {why}",
         )
-
-    def text(self, formula: Any) -> str:
-        """Return a formula as an expression of the model."""
-        return as_text(formula.xreplace(self._named))

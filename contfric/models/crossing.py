@@ -42,7 +42,6 @@ import sympy
 
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError
-from contfric.models.functions import as_text
 from contfric.models.symbols import Formulas
 
 _SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -61,7 +60,7 @@ class CrossingSurfaces:
         modes = _quadrants(description, surfaces)
         self.others = {s: v for s, v in modes[1, 1].sides.items() if s not in surfaces}
         names = [mode.name for mode in description.modes]
-        fields, rates = formulas.fields(), formulas.rates()
+        fields, heights = formulas.fields(), [formulas.heights()[name] for name in surfaces]
         f = {signs: fields[names.index(mode.name)] for signs, mode in modes.items()}
         self._check_sum(f)
         self.mean = [sum(row) / 4 for row in zip(*f.values(), strict=True)]
@@ -69,13 +68,10 @@ class CrossingSurfaces:
             [(a - b) / 2 for a, b in zip(f[1, 1], f[other], strict=True)]
             for other in ((-1, 1), (1, -1))
         ]
-        observables = [o.name for o in description.observables]
-        own = [next(s for s in description.surfaces if s.name == name) for name in surfaces]
-        c = [observables.index(surface.observable) for surface in own]
-        self.known = self._known(own)
+        self.known = [self._known(height) for height in heights]
         r = {  # each rate counts on its own surface only
-            s: [rates[names.index(m.name)][k].subs(self.known[i]) for i, k in enumerate(c)]
-            for s, m in modes.items()
+            s: [formulas.rate(heights[i], field).subs(self.known[i]) for i in (0, 1)]
+            for s, field in f.items()
         }
         self.rates = [sympy.simplify(sum(r[s][i] for s in _SIGNS) / 4) for i in (0, 1)]
         self.matrix = sympy.Matrix(
@@ -85,12 +81,6 @@ class CrossingSurfaces:
         )
         self.det = sympy.simplify(self.matrix.det())
         self._check_matrix()
-        self.named = {
-            **dict(zip(formulas.y, map(sympy.Symbol, description.states), strict=True)),
-            **dict(
-                zip(formulas.p, (sympy.Symbol(p.name) for p in description.parameters), strict=True)
-            ),
-        }
 
     def _check_sum(self, f: Mapping[tuple[int, int], list[Any]]) -> None:
         for k, state in enumerate(self.formulas.description.states):
@@ -110,10 +100,7 @@ class CrossingSurfaces:
                 "how strongly each switch drives depends on the state or on time, and regions of sliding "
                 "there are not derived"
             )
-        values = {
-            p: q.default
-            for p, q in zip(self.formulas.p, self.formulas.description.parameters, strict=True)
-        }
+        values = self.formulas.defaults
         a = [[float(self.matrix[i, j].subs(values)) for j in (0, 1)] for i in (0, 1)]
         if a[0][0] >= 0 or a[1][1] >= 0 or a[0][0] * a[1][1] - a[0][1] * a[1][0] <= 0:
             self.refuse(
@@ -136,25 +123,15 @@ class CrossingSurfaces:
             "sliding modes yourself",
         )
 
-    def _known(self, own: list[Any]) -> list[dict[Any, Any]]:
-        """Return what is known of states on each surface: that of its level, where it is one of a state."""
-        formulas, found = self.formulas, []
-        observables = dict(
-            zip(
-                (o.name for o in formulas.description.observables),
-                formulas.observables(),
-                strict=True,
-            )
-        )
-        for surface in own:
-            state = observables[surface.observable]
-            level = formulas.read(("surfaces", surface.name, "level"), surface.level)
-            found.append({state: level} if state in formulas.y else {})
-        return found
+    def _known(self, height: Any) -> dict[Any, Any]:
+        """Return what is known of states on a surface: that of its level, where it is one of a state."""
+        moving = {self.formulas.t, *self.formulas.y}
+        levels = {state: state - height for state in self.formulas.y}
+        return {s: level for s, level in levels.items() if not level.free_symbols & moving}
 
     def text(self, formula: Any) -> str:
         """Return a formula as an expression of the model."""
-        return as_text(sympy.simplify(formula).xreplace(self.named))
+        return self.formulas.text(sympy.simplify(formula))
 
     def field(self, values: tuple[Any, Any], on: tuple[int, ...]) -> dict[str, str]:
         """Return the field of both switches at some values, on some of the surfaces."""
@@ -318,9 +295,7 @@ class _Limits:
         The regions of a model lie between its surfaces in their order at the default parameters.
         """
         formulas = self.crossing.formulas
-        values = {
-            p: q.default for p, q in zip(formulas.p, formulas.description.parameters, strict=True)
-        }
+        values = formulas.defaults
         for known in self.levels.values():
             placed = sorted(known, key=lambda item: float(item[1].subs(values)))
             for (_, low), (_, high) in itertools.pairwise(placed):

@@ -26,11 +26,9 @@ from typing import Any
 import sympy
 
 from contfric.models.crossing import crossing_parts
-from contfric.models.definition import Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError, as_identifier
 from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.functions import as_text
 from contfric.models.regions import combinations, engine_order
 from contfric.models.symbols import Formulas
 
@@ -161,17 +159,16 @@ def _name(
     return f"slide_{stems.pop()}" if short else f"slide_{surface}_{above.name}_{below.name}"
 
 
-def _known_on(formulas: Formulas, surface: Surface, observable: Any) -> dict[Any, Any]:
+def _known_on(formulas: Formulas, height: Any) -> dict[Any, Any]:
     """Return a state as the others give it on a surface; nothing where its observable is linear in none.
 
     What is derived counts on the surface only. Off it the field of the other side may have a pole, such as
     friction that falls with the speed, read backwards.
     """
-    level = formulas.read(("surfaces", surface.name, "level"), surface.level)
     for state in formulas.y:
-        slope = sympy.diff(observable, state)
+        slope = sympy.diff(height, state)
         if slope.is_number and slope != 0:
-            return {state: sympy.expand(state - (observable - level) / slope)}
+            return {state: sympy.expand(state - height / slope)}
     return {}
 
 
@@ -185,27 +182,20 @@ class _Sliding:
         self, formulas: Formulas, surface: str, above: ModeText, below: ModeText, name: str
     ) -> None:
         description = formulas.description
-        self.surface, self.name = surface, name
+        self.surface, self.name, self.text = surface, name, formulas.text
         self.sides = {s: v for s, v in {**above.sides, **below.sides}.items() if s != surface}
         names = [m.name for m in description.modes]
-        own = next(s for s in description.surfaces if s.name == surface)
-        c = [o.name for o in description.observables].index(own.observable)
-        fields, rates = formulas.fields(), formulas.rates()
-        up, down = names.index(above.name), names.index(below.name)
-        on = _known_on(formulas, own, formulas.observables()[c])
-        self.rate_up, self.rate_down = (rates[k][c].subs(on) for k in (up, down))
+        fields, height = formulas.fields(), formulas.heights()[surface]
+        up, down = (fields[names.index(mode.name)] for mode in (above, below))
+        on = _known_on(formulas, height)
+        self.rate_up, self.rate_down = (formulas.rate(height, f).subs(on) for f in (up, down))
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
         self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
-        known = dict(zip(formulas.y, description.states, strict=True))
-        known |= dict(zip(formulas.p, (p.name for p in description.parameters), strict=True))
-        self.named = {symbol: sympy.Symbol(name) for symbol, name in known.items()}
-        largest = self.apart
-        if self.constant:
-            largest = largest.xreplace(self.named).subs(defaults(description))
+        largest = self.apart.subs(formulas.defaults) if self.constant else self.apart
         self.somewhere = not largest.is_nonpositive
         if not self.somewhere:
             return
-        pair = zip(fields[up], fields[down], strict=True)
+        pair = zip(up, down, strict=True)
         self.field = [
             a
             if sympy.expand(a - b) == 0
@@ -213,10 +203,6 @@ class _Sliding:
             for a, b in ((a.subs(on), b.subs(on)) for a, b in pair)
         ]
         self.states = description.states
-
-    def text(self, formula: Any) -> str:
-        """Return a formula as an expression of the model."""
-        return as_text(formula.xreplace(self.named))
 
 
 def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> None:

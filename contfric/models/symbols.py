@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import sympy
@@ -17,6 +18,7 @@ from contfric.models.affine import AffineForm, affine_form
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.formulas import FORMULAS, formula, resolved
+from contfric.models.functions import as_text
 from contfric.models.grammar import TIME, parse
 from contfric.models.not_affine import NotAffineError
 from contfric.models.regions import engine_order, known_sides
@@ -45,6 +47,21 @@ class Formulas:
             raise
         except ModelError as error:
             raise EntryError(address, str(error)) from None
+
+    @cached_property
+    def _named(self) -> dict[Any, Any]:
+        """States and parameters by the names that expressions have for them."""
+        names = (*self.description.states, *(p.name for p in self.description.parameters))
+        return dict(zip((*self.y, *self.p), map(sympy.Symbol, names), strict=True))
+
+    def text(self, formula: Any) -> str:
+        """Return a formula as an expression of the model."""
+        return as_text(formula.xreplace(self._named))
+
+    @property
+    def defaults(self) -> dict[Any, float]:
+        """The parameters with their defaults."""
+        return {p: q.default for p, q in zip(self.p, self.description.parameters, strict=True)}
 
     def observables(self) -> list[Any]:
         """Return the formula of each observable."""
