@@ -123,19 +123,11 @@ def _without_values(report: ModelReport, probe: Probe) -> bool:
 def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
     """Yield (what changes, line, first place, last place) through a few states of a mode."""
     low, high = probe.model.region(probe.vector, 2.0)
-    seen = 0
-    for t, y in probe.states(_TRIED):
-        place = probe.inside(mode, t, y)
-        if place is None:
-            continue
-        seen += 1
-        time, state = place
+    for time, state in probe.places(mode, _TRIED, probe.share(_STATES)):
         if probe.period > 0.0:
             yield "t", partial(_at_time, state), time, time + probe.period
         for k, name in enumerate(probe.model.states):
             yield name, partial(_at_state, time, state, k), low[k], high[k]
-        if seen == probe.share(_STATES):
-            return
 
 
 def _at_time(y: FloatArray, time: float) -> tuple[float, FloatArray]:

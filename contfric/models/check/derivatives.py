@@ -110,15 +110,11 @@ def _nearby(model: Model, probe: Probe) -> dict[str, float]:
 
 def _points(probe: Probe, mode: str | None) -> Iterator[FloatArray]:
     """Yield (t, state, parameters), in the region of a mode if one is given."""
-    found = 0
-    for t, y in probe.states(400):
-        place = (t, y) if mode is None else probe.inside(mode, t, y)
-        if place is None:
-            continue
-        yield np.array([place[0], *place[1], *probe.vector])
-        found += 1
-        if found == (_STATES if mode is None else probe.share(_STATES)):
-            return
+    places = (
+        probe.states(_STATES) if mode is None else probe.places(mode, 400, probe.share(_STATES))
+    )
+    for t, y in places:
+        yield np.array([t, *y, *probe.vector])
 
 
 def _compare(

@@ -38,10 +38,7 @@ def _compare(
     report: ModelReport, probe: Probe, mode: Mode, surface: str, above: str, below: str
 ) -> None:
     held = 0
-    for t, y in probe.states(_STATES):
-        place = probe.inside(mode.name, t, y)
-        if place is None:
-            continue
+    for place in probe.places(mode.name, _STATES):
         up, down = (probe.rate(m, surface, *place) for m in (above, below))
         if not up < 0.0 < down:
             held += 1

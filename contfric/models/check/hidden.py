@@ -65,7 +65,9 @@ def check_hidden(report: ModelReport, probe: Probe) -> None:
 
 def hidden_symmetry(probe: Probe) -> SignChanges | None:
     """Return a symmetry that a model has at some parameters, declared or not; None if none was found."""
-    places = {mode.name: list(_places(probe, mode.name)) for mode in probe.model.modes}
+    places = {
+        mode.name: list(probe.places(mode.name, _DRAWS, _STATES)) for mode in probe.model.modes
+    }
     if not all(len(own) == _STATES for own in places.values()):
         return None
     first = next((m.name for m in probe.model.modes if not m.sliding), probe.model.modes[0].name)
@@ -86,12 +88,6 @@ def _patterns(states: int) -> Iterator[tuple[float, ...]]:
         yield (-1.0,) * states
         return
     yield from list(itertools.product((-1.0, 1.0), repeat=states))[:-1]
-
-
-def _places(probe: Probe, mode: str) -> Iterator[Place]:
-    """Yield times and states in the region of a mode."""
-    found = (probe.inside(mode, t, y) for t, y in probe.states(_DRAWS))
-    yield from itertools.islice((place for place in found if place is not None), _STATES)
 
 
 def _shift(
@@ -244,7 +240,7 @@ def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> list[str]:
     """Return the shift of each state as an expression of the parameters, or as a number."""
     first, rows, values = found.pair[0], [], []
     for other in beside:
-        places = list(_places(other, first))
+        places = list(other.places(first, _DRAWS, _STATES))
         shift = _shift(other, found.signs, found.pair, places) if places else None
         if shift is not None:
             rows.append([1.0, *other.vector])

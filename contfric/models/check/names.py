@@ -152,13 +152,10 @@ def check_two_folds(report: ModelReport, probe: Probe) -> None:
 
     report.count(Topic.TWO_FOLDS)
     for fold in find_two_folds(model, probe.params, starts=_STARTS):
-        where = ", ".join(
-            f"{name} = {value:.6g}" for name, value in zip(model.states, fold.state, strict=True)
-        )
-        when = "" if model.autonomous else f", t = {fold.time:.6g}"
         wide = f" (one of a set of dimension {fold.dimension})" if fold.dimension else ""
         report.note(
             Topic.TWO_FOLDS,
             f"two-fold on '{fold.surface}' between '{fold.above}' and '{fold.below}', {fold.kind.value}, "
-            f"at {where}{when}{wide}: a solution that comes through it need not be unique",
+            f"at {probe.shown(fold.time, fold.state)}{wide}: a solution that comes through it need not be "
+            "unique",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 from collections.abc import Iterator, Mapping
@@ -112,6 +113,18 @@ class Probe:
             landed = self.landed((surface,), t, y)
             if landed is not None:
                 yield landed
+
+    def places(
+        self, mode: str, drawn: int, most: int | None = None
+    ) -> Iterator[tuple[float, FloatArray]]:
+        """Yield places of a mode, at most so many, near states of which so many are drawn."""
+        found = (self.inside(mode, t, y) for t, y in self.states(drawn))
+        yield from itertools.islice((place for place in found if place is not None), most)
+
+    def shown(self, t: float, y: FloatArray) -> str:
+        """Return a time and a state in words; no time where nothing depends on it."""
+        values = ", ".join(f"{s} = {v:.6g}" for s, v in zip(self.model.states, y, strict=True))
+        return values if self.model.autonomous else f"t = {t:.6g}, {values}"
 
     def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
         """Return a state of a mode near a state: on the surfaces that it moves on; None if outside.

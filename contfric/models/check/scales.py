@@ -54,8 +54,7 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
     rates = [
         np.abs(probe.field(mode.name, *place))
         for mode in model.modes
-        for t, y in probe.states(_STATES)
-        if (place := probe.inside(mode.name, t, y)) is not None
+        for place in probe.places(mode.name, _STATES)
     ]
     if not rates:
         return

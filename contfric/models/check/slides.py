@@ -52,6 +52,5 @@ def _met(probe: Probe, domain: Domain, surface: str) -> str:
         if any(signs[name] != side for name, side in others.items()):
             continue
         if domain.signs[surface] * probe.rate(domain.own_mode, surface, t, y) < -_STILL:
-            values = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
-            return values if probe.model.autonomous else f"t = {t:.6g}, {values}"
+            return probe.shown(t, y)
     return ""

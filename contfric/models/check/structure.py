@@ -35,7 +35,7 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
                 report.error(
                     Topic.SURFACES,
                     f"the gradient of '{surface.observable}' vanishes on surface '{surface.name}' at "
-                    f"{_place(probe, t, y)}: crossings of it cannot be located. Use an observable "
+                    f"{probe.shown(t, y)}: crossings of it cannot be located. Use an observable "
                     "that changes its sign there with a slope, such as x in place of x**2",
                 )
                 break
@@ -161,7 +161,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                     report,
                     probe,
                     Topic.TRANSITIONS,
-                    f"a solution in '{name}' meets '{surface.name}' at {_place(probe, t, y)}, and no "
+                    f"a solution in '{name}' meets '{surface.name}' at {probe.shown(t, y)}, and no "
                     f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (it "
                     "stays), or one on the other side",
                 )
@@ -194,7 +194,7 @@ def _goes_on(
         report,
         probe,
         Topic.TRANSITIONS,
-        f"a solution in '{name}' meets '{surface.name}' at {_place(probe, t, y)} and should go on in "
+        f"a solution in '{name}' meets '{surface.name}' at {probe.shown(t, y)} and should go on in "
         f"'{following}', whose field leads back to the surface: the solution is caught there. Add a mode "
         f"with {surface.name}: 0 (it slides on the surface), with the condition under which it stays",
     )
@@ -237,7 +237,7 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     model, name = probe.model, reset.surface
     behind = probe.reset(name, t, y)
     signs = probe.signs(t, behind)
-    where = f"after the reset at '{name}' the solution from {_place(probe, t, y)}"
+    where = f"after the reset at '{name}' the solution from {probe.shown(t, y)}"
     possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
     passes = other_side(model, reset, before)
     fits = [
@@ -268,10 +268,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
             check_left(report, model, mode)
         domain = next(d for d in model.domains if d.own_mode == mode.name)
         surfaces = tuple(name for name, side in domain.signs.items() if side == 0)
-        for t, y in probe.states(_ON_SURFACE):
-            place = probe.inside(mode.name, t, y)
-            if place is None:
-                continue
+        for place in probe.places(mode.name, _ON_SURFACE):
             report.count(Topic.SLIDING)
             for name in surfaces:
                 rate = probe.rate(mode.name, name, *place)
@@ -279,7 +276,7 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
                     report.error(
                         Topic.SLIDING,
                         f"mode '{mode.name}' leaves its surface '{name}': at "
-                        f"{_place(probe, *place)} the rate of "
+                        f"{probe.shown(*place)} the rate of "
                         f"'{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
                     )
                     return
@@ -297,10 +294,7 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
         report.error(Topic.SYMMETRY, f"{error}: leave 'symmetry' out, or add the missing domain")
         return
     for domain in model.domains:
-        for t, y in probe.states(_EVERYWHERE):
-            place = probe.inside(domain.own_mode, t, y)
-            if place is None:
-                continue
+        for place in probe.places(domain.own_mode, _EVERYWHERE, 1):
             moved, mirrored = place[0] + shift, matrix @ place[1]
             report.count(Topic.SYMMETRY)
             mode = model.domain_by_name[images[domain.name]].own_mode
@@ -310,7 +304,7 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
                 report.error(
                     Topic.SYMMETRY,
                     f"the field of mode '{mode}' is no image of that of '{domain.own_mode}': at "
-                    f"{_place(probe, *place)} the image of the rates is {here.tolist()}, the rates at "
+                    f"{probe.shown(*place)} the image of the rates is {here.tolist()}, the rates at "
                     f"the image are {there.tolist()}. Leave 'symmetry' out, or correct a field",
                 )
                 return
@@ -320,22 +314,16 @@ def check_symmetry(report: ModelReport, probe: Probe) -> None:
                 if not abs(a + b) <= _SAME * (1.0 + abs(a) + abs(b)):
                     report.error(
                         Topic.SYMMETRY,
-                        f"surface '{image}' is no image of '{name}' at {_place(probe, *place)}",
+                        f"surface '{image}' is no image of '{name}' at {probe.shown(*place)}",
                     )
                     return
-            break
 
 
 def check_period(report: ModelReport, probe: Probe) -> None:
     """Check that what depends on time has the model's period, and that nothing does without one."""
     model, period = probe.model, probe.period
     for mode in model.modes:
-        seen = 0
-        for t, y in probe.states(_EVERYWHERE):
-            place = probe.inside(mode.name, t, y)
-            if place is None:
-                continue
-            seen += 1
+        for place in probe.places(mode.name, _EVERYWHERE, 4):
             later = place[0] + (period or 0.7310585)  # any time will do where nothing depends on it
             report.count(Topic.PERIOD)
             fields = (probe.field(mode.name, *place), probe.field(mode.name, later, place[1]))
@@ -347,8 +335,6 @@ def check_period(report: ModelReport, probe: Probe) -> None:
                 if not abs(a - b) <= _SAME * (1.0 + abs(a)):
                     report.error(Topic.PERIOD, _not_periodic(f"observable '{name}'", period))
                     return
-            if seen == 4:
-                break
 
 
 def check_angles(report: ModelReport, probe: Probe) -> None:
@@ -378,11 +364,6 @@ def _not_periodic(what: str, period: float) -> str:
         f"{what} is not the same one period ({period:.9g} at the defaults) later: 'period' must be a "
         "common period of everything that depends on t"
     )
-
-
-def _place(probe: Probe, t: float, y: FloatArray) -> str:
-    values = ", ".join(f"{s} = {v:.6g}" for s, v in zip(probe.model.states, y, strict=True))
-    return values if probe.model.autonomous else f"t = {t:.6g}, {values}"
 
 
 def _sides(signs: dict[str, int]) -> str:
