@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.matching import inner_orbit
+from contfric.atlas.leaving_event import settings_for
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
 from contfric.continuation.crossing_ends import starts_along
 from contfric.continuation.events import Decision, EndReason
-from contfric.continuation.points import Settings, settings_of
+from contfric.continuation.points import Settings
 from contfric.continuation.switching import leave_along
 from contfric.continuation.trace import follow_orbit
 from contfric.orbit.orbit import Orbit
@@ -61,33 +60,12 @@ def _follow_through(
         there = refine(start.point.orbit(orbit.system, orbit.vector, active), damped=False)
         if not (there.converged and there.admissible):
             continue
-        known = state.known(there)
-        branch = None if known is not None else whole_branch(there, settings)
-        if branch is not None:
-            known = state.known(inner_orbit(branch))
-        if known is not None or branch is None:
-            state.judge(event, reason, Decision.KNOWN, known)
-        else:
-            state.accept(event, reason, branch)
+        if not state.knows(event, reason, there):
+            state.take(event, reason, whole_branch(there, settings))
         return
     state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
 
 
 def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
     """Return the branch of an orbit, both ways."""
-    own = settings_of(
-        orbit,
-        settings.parameter,
-        (settings.low, settings.high),
-        settings.largest,
-        settings.stability and not orbit.system.holds,
-        settings.most_points,
-    )
-    own = replace(
-        own,
-        grows=settings.grows,
-        copies=settings.copies,
-        stop_at=settings.stop_at,
-        up_to_mirror=True,
-    )
-    return follow_orbit(orbit, own)
+    return follow_orbit(orbit, settings_for(orbit, settings))

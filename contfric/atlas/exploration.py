@@ -11,6 +11,7 @@ from contfric.atlas.matching import (
     SAME_SOLUTION,
     identity,
     identity_of,
+    inner_orbit,
     on_branch,
     same_event,
     stops_distance,
@@ -197,6 +198,20 @@ class Exploration:
     def known(self, orbit: Orbit) -> int | None:
         """Return the branch, of those already traced, that an orbit lies on, or None."""
         return next((i for i, b in enumerate(self.branches) if on_branch(orbit, b)), None)
+
+    def knows(self, event: Event, reason: str, orbit: Orbit) -> bool:
+        """Tell whether an orbit lies on a branch already traced, and say so on the event."""
+        known = self.known(orbit)
+        if known is not None:
+            self.judge(event, reason, Decision.KNOWN, known)
+        return known is not None
+
+    def take(self, event: Event, reason: str, branch: Branch) -> bool:
+        """Register a branch that meets an event, if it is not known; whether it is new."""
+        if self.knows(event, reason, inner_orbit(branch)):
+            return False
+        self.accept(event, reason, branch)
+        return True
 
     def ends_here(self, orbit: Orbit, event: Event) -> int | None:
         """Return the branch of the orbit's itinerary that already ends at an event; None if none does."""

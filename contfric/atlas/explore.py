@@ -16,6 +16,7 @@ from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
+from contfric.atlas.leaving_event import settings_for
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
 from contfric.atlas.short_branches import begins_at_short
@@ -148,8 +149,7 @@ def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:
 
 def _first_branch(state: Exploration, orbit: Orbit) -> Branch:
     """Return the branch through the start; of a continuum the one through its symmetric orbit."""
-    settings = state.settings
-    settings = altered(settings, stability=settings.stability and not orbit.system.holds)
+    settings = settings_for(orbit, state.settings)
     try:
         return follow_orbit(orbit, settings, state.progress, keep=True)
     except ConvergenceError:

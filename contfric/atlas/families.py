@@ -13,7 +13,7 @@ from contfric.atlas.faults import fault_of
 from contfric.atlas.matching import SAME_SOLUTION, stops_apart
 from contfric.continuation.candidates import candidates
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import TERMINAL, Decision, End, Kind
+from contfric.continuation.events import TERMINAL, End, Kind
 from contfric.continuation.points import Settings, next_to
 from contfric.continuation.trace import follow_family
 from contfric.continuation.vertical import family_near
@@ -38,8 +38,7 @@ def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str
     family = family_near(orbit, orbit.model.index_of(state.settings.parameter), within)
     if family is None:
         return False
-    if (known := state.known(family.orbit)) is not None:
-        state.judge(event, reason, Decision.KNOWN, known)
+    if state.knows(event, reason, family.orbit):
         return True
     branch = follow_family(family, state.settings, state.progress)
     if branch is None or fault_of(branch, state.settings.width):

@@ -24,7 +24,7 @@ from contfric.continuation.points import Point
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import NEARER, settings_value
-from contfric.continuation.trace import follow_orbit, trace_side
+from contfric.continuation.trace import trace_side
 from contfric.continuation.vertices import symmetrised
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
@@ -101,15 +101,13 @@ def _try_arms(
         there = arms.orbit(sequence)
         if not (there.converged and there.admissible):
             continue
-        if (known := state.known(there)) is not None:
-            state.judge(event, reason, Decision.KNOWN, known)
+        if state.knows(event, reason, there):
             return
-        settings = settings_for(there, state.settings)
         beyond = there if sequence == exchanged else arms.orbit(exchanged)
         if beyond is not there and not (beyond.converged and state.known(beyond) is not None):
-            state.accept(event, reason, whole_branch(there, settings))
+            state.accept(event, reason, whole_branch(there, state.settings))
             return
-        point = first_point(there, settings)
+        point = first_point(there, settings_for(there, state.settings))
         if point is not None:
             _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)
             return
@@ -139,8 +137,7 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
             off = there.mirror_distance > _ODD * distance
             if not there.admissible or off is orbit.system.half:
                 continue
-            if (known := state.known(there)) is not None:
-                state.judge(event, reason, Decision.KNOWN, known)
+            if state.knows(event, reason, there):
                 return
             _add_crossing(state, event, orbit, point, reason)
             return
@@ -164,7 +161,7 @@ def _add_crossing(
         return
     active = orbit.model.index_of(state.settings.parameter)
     there = point.orbit(orbit.system, orbit.vector, active)
-    state.accept(event, reason, follow_orbit(there, settings_for(orbit, state.settings)))
+    state.accept(event, reason, whole_branch(there, state.settings))
 
 
 def _add_one_sided(

@@ -168,10 +168,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
-        if (known := state.known(inner_orbit(branch))) is not None:
-            state.judge(event, reason, Decision.KNOWN, known)
-        else:
-            state.accept(event, reason, branch)
+        if state.take(event, reason, branch):
             for end in ends:
                 state.merge(event, end)
     for itinerary in (w for w in refused if w not in done):
@@ -239,37 +236,30 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         return met
     branch = leave_event(state, candidate, event)
     if branch is None and event.bifurcation.accuracy > ACCURACY:
-        assert candidate.orbit is not None
         branch = _through(state, candidate.orbit)
         if branch is not None and branch.arc[-1] < _NOWHERE_ROUGHLY:
             branch = None
-        known = None if branch is None else state.known(inner_orbit(branch))
-        if known is not None:
-            state.judge(event, candidate.reason, Decision.KNOWN, known)
+        if branch is not None and state.knows(event, candidate.reason, inner_orbit(branch)):
             return True
-    if branch is not None and _has_no_width(branch, event, state.settings):
-        assert candidate.orbit is not None
-        own = settings_for(candidate.orbit, state.settings)
-        branch = leave_singular(state, candidate.orbit, event, own) or branch
-    fault = None if branch is None else fault_of(branch, state.settings.width)
-    if fault is not None:
-        state.judge(event, candidate.reason, Decision.REFUSED, why=fault)
-        return False
-    if branch is not None and _has_no_width(branch, event, state.settings):
-        why = "it begins and ends at the event, without any width"
-        state.judge(event, candidate.reason, Decision.REFUSED, why=why)
-        return False
-    if branch is not None and (found := state.known(inner_orbit(branch))) is not None:
-        if any(ends_at(end, event, state.settings) for end in state.branches[found].ends):
-            state.judge(event, candidate.reason, Decision.KNOWN, found)
-            return True
-        state.judge(event, candidate.reason, Decision.REFUSED, why=_ELSEWHERE)
-        return False
     if branch is None:
         why = "no admissible orbit beyond the event"
         if _begins_continuum(state, candidate.orbit, event):
             why = EndReason.CONTINUUM.value
         state.judge(event, candidate.reason, Decision.REFUSED, why=why)
+        return False
+    if _has_no_width(branch, event, state.settings):
+        own = settings_for(candidate.orbit, state.settings)
+        branch = leave_singular(state, candidate.orbit, event, own) or branch
+    fault = fault_of(branch, state.settings.width)
+    if fault is None and _has_no_width(branch, event, state.settings):
+        fault = "it begins and ends at the event, without any width"
+    if fault is None and (found := state.known(inner_orbit(branch))) is not None:
+        if any(ends_at(end, event, state.settings) for end in state.branches[found].ends):
+            state.judge(event, candidate.reason, Decision.KNOWN, found)
+            return True
+        fault = _ELSEWHERE
+    if fault is not None:
+        state.judge(event, candidate.reason, Decision.REFUSED, why=fault)
         return False
     branch, ends = _located_by(state, branch, event)
     branch = from_admissible(branch, candidate.orbit) if not ends else branch
@@ -351,10 +341,8 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
     branch = _through(state, orbit)
     if branch is None:
         state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
-    elif (known := state.known(inner_orbit(branch))) is not None:
-        state.judge(event, reason, Decision.KNOWN, known)
     else:
-        state.accept(event, reason, branch)
+        state.take(event, reason, branch)
 
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
