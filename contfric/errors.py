@@ -140,18 +140,17 @@ class AperiodicError(ConvergenceError):
 _MOST_NAMES, _NEAREST = 24, 12
 
 
-def did_you_mean(itinerary: object, valid: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"`` for the closest valid itineraries, and the list of valid itineraries.
+def did_you_mean(given: object, valid: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the closest valid name, and the list of valid names.
 
     Examples
     --------
     >>> did_you_mean("Omga", ["Omega", "S"])
     "; did you mean 'Omega'? Valid: Omega, S"
     """
-    names, itinerary = [str(name) for name in valid], str(itinerary)
+    names, text = [str(name) for name in valid], str(given).lower()
     likeness = {  # upper and lower case count as the same
-        name: difflib.SequenceMatcher(None, itinerary.lower(), name.lower()).ratio()
-        for name in names
+        name: difflib.SequenceMatcher(None, text, name.lower()).ratio() for name in names
     }
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]

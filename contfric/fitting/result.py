@@ -152,7 +152,7 @@ class Fit(Tabled):
 
 
 def what_of(datum: Datum) -> str:
-    """Return what was measured, in an itinerary: a quantity, a signal, or an event."""
+    """Return what was measured, in a word: a quantity, a signal, or an event."""
     if isinstance(datum, Jump):
         return f"{datum.parameter} of {datum.event.label}"
     return datum.signal if isinstance(datum, Series) else datum.quantity

@@ -215,7 +215,7 @@ def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> N
     ----------
     heights : the surfaces of the modes before it, with the rate that vanishes there
     """
-    own, itinerary = sliding.name, as_identifier(sliding.name)
+    own, stem = sliding.name, as_identifier(sliding.name)
     sides: dict[str, Any] = {**sliding.sides, sliding.surface: 0}
     ends = ((f"{own}-", "-", sliding.rate_up), (f"{own}+", "+", sliding.rate_down))
     new = []
@@ -224,12 +224,12 @@ def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> N
         if not same:
             new.append((name, rate))
         sides[same or name] = side if sense > 0 else {"-": "+", "+": "-"}[side]
-    up = f"{itinerary}_rate"
+    up = f"{stem}_rate"
     for name, rate in new:
         if sliding.constant and name == f"{own}+" and up in found["observables"]:
             entry = {"observable": up, "level": f"-({sliding.text(sliding.apart)})"}
         else:
-            entry = {"observable": up if name == f"{own}-" else f"{itinerary}_below", "level": "0"}
+            entry = {"observable": up if name == f"{own}-" else f"{stem}_below", "level": "0"}
             found["observables"][entry["observable"]] = sliding.text(rate)
         found["surfaces"][name] = entry
         heights[name] = rate

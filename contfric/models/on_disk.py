@@ -26,7 +26,7 @@ def derived(kind: str, source: str, derive: Callable[[], T]) -> T:
 
     Parameters
     ----------
-    kind : what it is, in an itinerary
+    kind : what it is, in a word
     """
     name = f"{hashlib.sha256(source.encode()).hexdigest()[:32]}.{kind}"
     place = Path("models", package_digest(), name)

@@ -101,8 +101,8 @@ class _ExpressionWriter:
         if isinstance(node, ast.UnaryOp):
             return f"(not {self._condition(node.operand)})"
         if isinstance(node, ast.BoolOp):
-            itinerary = " or " if isinstance(node.op, ast.Or) else " and "
-            return "(" + itinerary.join(self._condition(part) for part in node.values) + ")"
+            joint = " or " if isinstance(node.op, ast.Or) else " and "
+            return "(" + joint.join(self._condition(part) for part in node.values) + ")"
         assert isinstance(node, ast.Compare)
         sides = [self.text(side) for side in (node.left, *node.comparators)]
         pairs = zip(node.ops, sides, sides[1:], strict=False)

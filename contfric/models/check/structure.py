@@ -367,5 +367,5 @@ def _not_periodic(what: str, period: float) -> str:
 
 
 def _sides(signs: dict[str, int]) -> str:
-    itineraries = {1: "above", -1: "below", 0: "on"}
-    return ", ".join(f"{itineraries[side]} {name}" for name, side in signs.items())
+    words = {1: "above", -1: "below", 0: "on"}
+    return ", ".join(f"{words[side]} {name}" for name, side in signs.items())

@@ -30,8 +30,6 @@ class BasinsTask(Response):
     """Starts on a grid of two states, labelled by what they converge to."""
 
     name = "basins"
-    result = "basins"
-    saved_as = "basins.npz"
     row_text = "one row a start of the basins"
     own = frozenset({"grid", "at"})
     figures: ClassVar = {"basins": FigureKind(8.4, 6.0)}

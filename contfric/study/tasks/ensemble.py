@@ -13,7 +13,7 @@ from contfric.base.yaml_schema import positive, whole
 from contfric.errors import ParameterError, StudyError, checked_range, did_you_mean
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, StudyCheck, incomplete
+from contfric.study.tasks.task import AlongParameter, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,18 +25,14 @@ if TYPE_CHECKING:
 _MOST = 12
 
 
-class EnsembleTask(Response):
+class EnsembleTask(Response, AlongParameter):
     """Diagrams of random parameters."""
 
     name = "ensemble"
-    result = "ensemble"
-    saved_as = "ensemble.npz"
     row_text = "one row an event of a sample"
-    own = frozenset({"parameter", "range", "distributions", "workers"})
+    own = AlongParameter.own | {"distributions", "workers"}
     figures: ClassVar = {"ensemble": FigureKind(9.6, 6.0)}
 
-    parameter: str = Field(description=PARAMETER)
-    range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
     distributions: dict[str, list[float] | dict[str, list[float]]] = Field(
         description="a mapping of parameters to [low, high], or to a distribution of scipy.stats with its "
         "arguments, such as {norm: [0.32, 0.01]}"
@@ -58,8 +54,8 @@ class EnsembleTask(Response):
         from contfric.ensembles.drawing import checked_distributions
         from contfric.quantities.registry import number_quantity
 
+        super().check(asked)
         steps = {
-            "parameter": lambda: asked.model.index_of(self.parameter),
             "range": lambda: checked_range(self.parameter, self.range),
             "distributions": lambda: checked_distributions(
                 asked.model, self._distributions(), self.parameter
@@ -109,9 +105,7 @@ class EnsembleTask(Response):
 
     def does(self, study: Study) -> str:
         """Return what is varied, in words."""
-        low, high = self.range
-        varied = ", ".join(self.distributions)
-        return f"diagrams of random {varied}, {self.parameter} from {low:g} to {high:g}"
+        return f"diagrams of random {', '.join(self.distributions)}, {self.span}"
 
     def compute(self, job: Job) -> Ensemble:
         """Compute it, in processes if there are several; a killed run goes on from its tiles."""
@@ -128,7 +122,7 @@ class EnsembleTask(Response):
         """Compute it for a study, with options of :func:`contfric.ensemble` in place of the task's."""
         from contfric.ensembles.compute import ensemble
 
-        low, high = self.range
+        low, high = self.bounds
         distributions = self._distributions()
         params = {n: value for n, value in study.params.items() if n not in distributions}
         if not low <= params[self.parameter] <= high:  # the model's default: nothing was asked for

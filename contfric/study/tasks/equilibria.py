@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pydantic import Field
-
 from contfric.base.shown import aligned
 from contfric.base.yaml_schema import positive, whole
 from contfric.errors import checked_range
 from contfric.study.tables import Table
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Job, StudyCheck, incomplete
+from contfric.study.tasks.task import AlongParameter, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.equilibria.events import EquilibriumEvent
@@ -20,25 +18,20 @@ if TYPE_CHECKING:
     from contfric.study.read import Study
 
 
-class EquilibriaTask(Response):
+class EquilibriaTask(Response, AlongParameter):
     """Equilibria over a range of a parameter, with their events."""
 
     name = "equilibria"
-    result = "equilibria"
-    saved_as = "equilibria.npz"
     row_text = "one row a point or event of the equilibria"
-    own = frozenset({"parameter", "range"})
     figures: ClassVar = {"equilibria": FigureKind(8.4, 5.0)}
 
-    parameter: str = Field(description=PARAMETER)
-    range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
     values: int | None = whole("values of the parameter at which equilibria are looked for")
     starts: int | None = whole("starts of Newton's method in a mode")
     max_step: float | None = positive("largest step, as a share of the range", most=1.0)
 
     def check(self, asked: StudyCheck) -> None:
         """Check the parameter, its range, and that the model has formulas."""
-        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
+        super().check(asked)
         asked.attempt((self.name, "range"), lambda: checked_range(self.parameter, self.range))
         if not asked.model.definition:
             text = f"equilibria are found from formulas, and '{asked.model.name}' is not declared by formulas"
@@ -46,18 +39,16 @@ class EquilibriaTask(Response):
 
     def does(self, study: Study) -> str:
         """Return the range in words."""
-        low, high = self.range
-        return f"equilibria, {self.parameter} from {low:g} to {high:g}, and their events"
+        return f"equilibria, {self.span}, and their events"
 
     def compute(self, job: Job) -> EquilibriumDiagram:
         """Find and follow equilibria."""
         from contfric.equilibria.explore import explore_equilibria
 
-        low, high = self.range
         return explore_equilibria(
             job.study.model,
             self.parameter,
-            (low, high),
+            self.bounds,
             job.study.params,
             progress=job.told(self.name),
             **self.options(),

@@ -93,8 +93,6 @@ class FitTask(Response):
     """Parameters at which the model agrees best with measurements."""
 
     name = "fit"
-    result = "fit"
-    saved_as = "fit.npz"
     row_text = "one row a free parameter, one row a measured value"
     own = frozenset({"free", "data"})
     figures: ClassVar = {"fit": FigureKind(8.0, 5.0)}

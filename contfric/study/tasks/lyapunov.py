@@ -32,8 +32,6 @@ class LyapunovTask(Response):
     """Lyapunov exponents on a grid of two parameters."""
 
     name = "lyapunov"
-    result = "lyapunov"
-    saved_as = "lyapunov.npz"
     row_text = "one row a trajectory of the map"
     own = frozenset({"grid"})
     figures: ClassVar = {"lyapunov": FigureKind(8.0, 5.6, called="a map of Lyapunov exponents")}

@@ -11,7 +11,7 @@ from contfric.base.yaml_schema import positive, whole
 from contfric.study.tables import Table, points
 from contfric.study.tasks.diagram_record import entries_of, lines_of
 from contfric.study.tasks.orbit import POINTS, points_text
-from contfric.study.tasks.task import PARAMETER, RANGE, FigureKind, Found, StudyCheck, Task
+from contfric.study.tasks.task import AlongParameter, FigureKind, Found, StudyCheck
 from contfric.study.wanted import Want, row_name
 
 if TYPE_CHECKING:
@@ -31,19 +31,16 @@ _STATES = frozenset({"x_max", "x_min", "stops"})
 _CONTINUATION = ("contfric.continuation.march:march", "contfric.continuation.bracket:locate")
 
 
-class OneParameter(Task):
+class OneParameter(AlongParameter):
     """A task along one parameter."""
 
     result = "diagram"
     of_orbit = True
-    own = frozenset({"parameter", "range"})
     figures: ClassVar = {
         "diagram": FigureKind(9.6, 1.2, 2.4, "a diagram"),
         "branches": FigureKind(9.6, 4.4, called="a graph of branches"),
     }
 
-    parameter: str = Field(description=PARAMETER)
-    range: list[float] = Field(min_length=2, max_length=2, description=RANGE)
     max_step: float | None = positive("largest step, as a share of the range", most=1.0)
     max_points: int | None = whole("most points of each side of a branch", least=10)
     stop_at: dict[str, float] | None = Field(
@@ -51,26 +48,18 @@ class OneParameter(Task):
         description="a mapping of quantities to the value at which a branch ends, such as {x_max: 1.4}",
     )
 
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """The ends of the range."""
-        return self.range[0], self.range[1]
-
     def check(self, asked: StudyCheck) -> None:
         """Check the parameter, and its range against the start and the model."""
-        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
+        super().check(asked)
         fault = _range_fault(asked.model, asked.params, self)
         if fault is not None:
             asked.fail((self.name, "range"), fault)
 
     def where(self, study: Study, *more: str) -> str:
         """Return the range, where branches end, and what is computed with them, in words."""
-        low, high = self.range
         stops = (f"to {name} = {value:g}" for name, value in (self.stop_at or {}).items())
         multipliers = ["with multipliers"] if study.wants(Want.STABILITY) else []
-        return ", ".join(
-            [f"{self.parameter} from {low:g} to {high:g}", *more, *stops, *multipliers]
-        )
+        return ", ".join([self.span, *more, *stops, *multipliers])
 
     def tables(self, study: Study) -> tuple[str, ...]:
         """Return its two tables."""

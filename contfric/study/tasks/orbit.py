@@ -35,8 +35,6 @@ class Start(Task):
     """Where the first orbit comes from: exactly one of the three."""
 
     name = "orbit"
-    result = "orbit"
-    saved_as = "orbit.npz"
     figures: ClassVar = {"orbit": FigureKind(9.0, 6.2), "transitions": FigureKind(7.0, 5.0)}
 
     simulate: Simulated | None = Field(None, description=keys_of(Simulated))

@@ -35,8 +35,6 @@ class PlaneTask(Task):
     """Follow the curves of bifurcations in a plane of two parameters."""
 
     name = "plane"
-    result = "plane"
-    saved_as = "plane.npz"
     row_text = "points of curves, of codimension two, regions"
     of_orbit = True
     own = frozenset({"parameters", "range", "sections", "seeds"})

@@ -19,8 +19,6 @@ class PoincareTask(SectionTask):
     """Points of one solution on a section."""
 
     name = "poincare"
-    result = "poincare"
-    saved_as = "poincare.npz"
     row_text = "one row a point of the section"
     figures: ClassVar = {"poincare": FigureKind(6.4, 6.0)}
 

@@ -77,8 +77,6 @@ class HoldTask(QuantityCurveTask):
     """Orbits on which a quantity has one value."""
 
     name = "hold"
-    result = "hold"
-    saved_as = "hold.npz"
     figures: ClassVar = {"hold": FigureKind(7.0, 5.0)}
 
     parameters: list[str] = Field(
@@ -105,8 +103,6 @@ class ExtremumTask(QuantityCurveTask):
     """Orbits at which a quantity is extreme in all parameters but the last."""
 
     name = "extremum"
-    result = "extremum"
-    saved_as = "extremum.npz"
     figures: ClassVar = {"extremum": FigureKind(7.0, 5.0)}
 
     def does(self, study: Study) -> str:

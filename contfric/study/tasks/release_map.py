@@ -21,8 +21,6 @@ class ReleaseMapTask(Response):
     """The one-dimensional map of releases."""
 
     name = "release_map"
-    result = "release_map"
-    saved_as = "release_map.npz"
     row_text = "one row a release"
     figures: ClassVar = {"release_map": FigureKind(6.4, 6.0)}
 

@@ -20,8 +20,6 @@ class StableSetTask(Response):
     """The stable set of the orbit of the start, which is unstable."""
 
     name = "stable_set"
-    result = "stable_set"
-    saved_as = "stable_set.npz"
     row_text = "one row a point of the stable set"
     of_orbit = True
     under = "basins"

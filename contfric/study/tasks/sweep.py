@@ -36,8 +36,6 @@ class SweepTask(SectionTask):
     """Simulations over values of a parameter."""
 
     name = "sweep"
-    result = "sweep"
-    saved_as = "sweep.npz"
     row_text = "one row a point of the sweep"
     own = frozenset({"parameter", "values"})
     figures: ClassVar = {"sweep": FigureKind(9.6, 5.0)}

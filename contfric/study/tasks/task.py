@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
+from pydantic import Field
 
 from contfric.base.yaml_schema import SchemaPart, keys_of, whole
 from contfric.errors import ContfricError
@@ -30,7 +31,6 @@ Found: TypeAlias = dict[str, Any]
 Say: TypeAlias = Callable[[str], None]
 
 PARAMETER = "the name of a parameter of the model"
-RANGE = "two finite numbers [low, high]"
 STATE = "a list of finite numbers, one for each state of the model"
 
 
@@ -138,8 +138,8 @@ class Task(SchemaPart):
     Attributes
     ----------
     name : the step of the run, and the key of the study
-    result : what its result is called
-    saved_as : file of the result
+    result : what its result is called; by default as the task
+    saved_as : file of the result; by default its name with ``.npz``
     row_text : what a row of its tables is
     of_orbit : whether it begins with the orbit of the start
     own : keys that :meth:`compute` hands over itself; the others are arguments by their names
@@ -153,6 +153,13 @@ class Task(SchemaPart):
     of_orbit: ClassVar[bool] = False
     own: ClassVar[frozenset[str]] = frozenset()
     figures: ClassVar[Mapping[str, FigureKind]] = {}
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **given: Any) -> None:
+        super().__pydantic_init_subclass__(**given)
+        if "name" in vars(cls):
+            cls.result = getattr(cls, "result", cls.name)
+            cls.saved_as = getattr(cls, "saved_as", f"{cls.name}.npz")
 
     @classmethod
     def described(cls) -> str:
@@ -234,6 +241,31 @@ class Task(SchemaPart):
     def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
         """Yield its entry of the record as lines of text."""
         yield from ()
+
+
+class AlongParameter(Task):
+    """A task over a range of one parameter."""
+
+    own = frozenset({"parameter", "range"})
+
+    parameter: str = Field(description=PARAMETER)
+    range: list[float] = Field(
+        min_length=2, max_length=2, description="two finite numbers [low, high]"
+    )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The ends of the range."""
+        return self.range[0], self.range[1]
+
+    @property
+    def span(self) -> str:
+        """The parameter and its range, in words."""
+        return f"{self.parameter} from {self.range[0]:g} to {self.range[1]:g}"
+
+    def check(self, asked: StudyCheck) -> None:
+        """Check that the model has the parameter."""
+        asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
 
 
 class SeedsEntry(SchemaPart):
