@@ -37,6 +37,8 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         raise ResultFileError(f"{path} is no ordinary file, and is not replaced: give another name")
+    if not path.name:  # "." or "/"
+        raise ResultFileError(unwritable(path, IsADirectoryError(errno.EISDIR, "Is a directory")))
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         yield temporary

@@ -15,7 +15,7 @@ from contfric.certify.verdict import Verdict
 from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
 from contfric.models.balls.numbers import working
-from contfric.verify.file import CHECKED_MODELS, FORMAT, Answer, check_text
+from contfric.verify.file import CHECKED_MODELS, CHECKS, FORMAT, Answer, check_text
 
 if TYPE_CHECKING:
     from contfric.certify.certificate import Certificate
@@ -216,6 +216,25 @@ def write_data(data: dict[str, Any], path: Any) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
+def _what_else(text: str) -> str:
+    """Return why a text is none of the certificates that the checker knows; nothing if it is one."""
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError):
+        return "it is no JSON file" if text.strip() else "it is empty"
+    kinds = (*CHECKS, "diagram")
+    if not isinstance(data, dict) or "certificate" not in data:
+        return "it is a JSON file without the entry 'certificate'"
+    if data["certificate"] not in kinds:
+        return f"its entry 'certificate' is none of {', '.join(kinds)}"
+    parts = data.get("checkable") if data["certificate"] == "diagram" else [data]
+    formats = {str(part.get("format")) for part in parts or () if isinstance(part, dict)}
+    if formats - {str(FORMAT)}:
+        others = ", ".join(sorted(formats - {str(FORMAT)}))
+        return f"it has format {others[:40]}, and format {FORMAT} is checked; write it anew"
+    return ""
+
+
 def verify(path: Any) -> Answer:
     """Check a certificate file by the independent checker.
 
@@ -229,11 +248,16 @@ def verify(path: Any) -> Answer:
         if file.stat().st_size > _LARGEST:
             raise ResultFileError(f"{file} is too large for a certificate")
         text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise ResultFileError(
             f"cannot read {file}: {error}; give the path of a certificate"
         ) from error
+    except UnicodeDecodeError:
+        return Answer(False, f"{file.name} is no certificate: it is no text")
     answer = check_text(text)
+    other = "" if answer.yes else _what_else(text)
+    if other:
+        return answer._replace(why=f"{file.name} is no certificate: {other}")
     if not answer.yes and '"checkable": []' in text:  # of another model, or all orbits have holds
         why = (
             f"it holds nothing that is checked: orbits without holds of {', '.join(CHECKED_MODELS)}"

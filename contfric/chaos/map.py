@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.extras import need_xarray
+from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
@@ -57,7 +58,7 @@ class LyapunovMap(Tabled):
     def params(self) -> dict[str, float]:
         """The parameters that do not vary."""
         named = self.model.mapping(self.vector)
-        return {name: value for name, value in named.items() if name not in self.axes}
+        return Named({name: value for name, value in named.items() if name not in self.axes})
 
     @property
     def shape(self) -> tuple[int, int]:

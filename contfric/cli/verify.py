@@ -22,7 +22,12 @@ def verify(options: argparse.Namespace) -> int:
         if any(text.endswith("open ends") for text in answer.statements):
             print(f"not checked: {UNCHECKED}")
         for text in left_out(options.file):
-            print(f"not in the file: {text}")
+            print(f"not in the file: {_plain(text)}")
         return Exit.DONE
-    print(f"no: {answer.why}")
+    print(f"no: {_plain(answer.why)}")
     return Exit.FAILED
+
+
+def _plain(text: str) -> str:
+    """Return a text of the file as one line: control characters could overwrite the answer."""
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
 from contfric.continuation.events import Kind, meaning_of
@@ -189,7 +190,7 @@ class Curve(Shown):
     @property
     def meanings(self) -> dict[str, str]:
         """What happens on the curve, in words, for each kind of its points."""
-        found: dict[str, str] = {}
+        found = Named[str]()
         for part in self.parts:
             found[part.kind.value] = either(found.get(part.kind.value, ""), part.meaning)
         return found

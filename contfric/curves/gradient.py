@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from contfric.base.named import Named
 from contfric.continuation.events import Bifurcation
 from contfric.curves.points import first_curve_point
 from contfric.curves.problem import Problem, problem_of
@@ -32,7 +33,7 @@ def event_gradient(bifurcation: Bifurcation, parameter: str | None) -> Gradient:
     model = bifurcation.orbit.model
     name = parameter_of(bifurcation) if parameter is None else parameter
     model.index_of(name)
-    slopes, notes = {}, []
+    slopes, notes = Named[float](), []
     for other in model.parameter_names:
         if other == name:
             continue
@@ -47,7 +48,7 @@ def event_gradient(bifurcation: Bifurcation, parameter: str | None) -> Gradient:
             "they part, the event is another one on each side"
         )
     value = bifurcation.params[name]
-    return Gradient(f"{name} of {bifurcation.label}", value, slopes, dict(slopes), tuple(notes))
+    return Gradient(f"{name} of {bifurcation.label}", value, slopes, slopes, tuple(notes))
 
 
 def parameter_of(bifurcation: Bifurcation) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.extras import need_pandas, need_xarray
+from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.ensembles.rows import Drawn, Rows, by_sample
 from contfric.ensembles.statistics import SobolIndices, share_of, sobol_indices
@@ -174,7 +175,7 @@ class Ensemble(Shown):
     def params(self) -> dict[str, float]:
         """The parameters that do not vary, by name."""
         found = self.model.mapping(self.vector)
-        return {name: value for name, value in found.items() if name not in self.distributions}
+        return Named({n: value for n, value in found.items() if n not in self.distributions})
 
     @property
     def complete(self) -> bool:

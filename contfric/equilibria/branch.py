@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.find import equilibrium_at
@@ -97,7 +98,7 @@ class EquilibriumBranch(Tabled):
     @property
     def params(self) -> dict[str, FloatArray | float]:
         """All parameters by name: an array of that which varies, numbers of the others."""
-        found: dict[str, FloatArray | float] = dict(self.model.mapping(self.vector))
+        found = Named[FloatArray | float](self.model.mapping(self.vector))
         found[self.parameter] = self.values
         return found
 

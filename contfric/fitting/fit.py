@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.named import Named
 from contfric.chaos.running import Progress, check_executor
 from contfric.errors import (
     ContfricError,
@@ -122,7 +123,7 @@ def fit(
             f"the data do not determine {', '.join(names)}: their derivatives depend on each other",
             best.orbits[0],
         )
-    values = {**best.orbits[0].params, **problem.values(best.x)}
+    values = Named({**best.orbits[0].params, **problem.values(best.x)})
     return Fit(
         values,
         names,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.base.extras import need_pandas
+from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
 from contfric.fitting.condition import Datum
@@ -80,10 +81,7 @@ class Fit(Tabled):
     @property
     def sigma(self) -> dict[str, float]:
         """Standard deviation of each free parameter."""
-        return {
-            name: float(np.sqrt(variance))
-            for name, variance in zip(self.free, np.diag(self.covariance), strict=True)
-        }
+        return Named(zip(self.free, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def chi_square(self) -> float:

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
 from contfric.models.parts import (
@@ -49,7 +50,7 @@ from contfric.models.parts import (
     Symmetry,
 )
 from contfric.models.transition_maps import TransitionMaps
-from contfric.remember.stored import given
+from contfric.remember.stored import given, made_of
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
@@ -246,7 +247,7 @@ class Model(Shown, TransitionMaps):
     @property
     def defaults(self) -> dict[str, float]:
         """A fresh mapping of every parameter to its default value."""
-        return {p.name: p.default for p in self.parameters}
+        return Named({p.name: p.default for p in self.parameters})
 
     def index_of(self, name: str) -> int:
         """Return the position of a parameter in the engine's vectors.
@@ -331,7 +332,7 @@ class Model(Shown, TransitionMaps):
 
     def mapping(self, vector: FloatArray) -> dict[str, float]:
         """Return the engine's vector as a mapping name -> float."""
-        return dict(zip(self.parameter_names, vector.tolist(), strict=True))
+        return Named(zip(self.parameter_names, vector.tolist(), strict=True))
 
     def columns(
         self, vector: FloatArray, varied: Mapping[str, FloatArray]
@@ -339,7 +340,7 @@ class Model(Shown, TransitionMaps):
         """Return all parameters at the points of a branch or curve, along which some are varied."""
         count = len(next(iter(varied.values())))
         fixed = {name: np.full(count, value) for name, value in self.mapping(vector).items()}
-        return {**fixed, **varied}
+        return Named({**fixed, **varied})
 
     def limits(self, name: str, params: Mapping[str, float]) -> tuple[float, float, str, str]:
         """Return the interval that the constraints leave to one parameter, others fixed.
@@ -379,3 +380,4 @@ def _digest_of(source: str) -> str:
 
 
 given(Model, _told_apart)
+made_of(Named, lambda names: tuple(names.items()), lambda *items: Named(items))

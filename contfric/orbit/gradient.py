@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
@@ -102,9 +103,7 @@ def gradients_of(orbit: Orbit, names: Iterable[str]) -> dict[str, Gradient]:
     quantities = [number_quantity(name, orbit.model, "a gradient") for name in names]
     found = differentiated_at_once(quantities, orbit, by_parameters(orbit))
     events = _events(orbit)
-    return {
-        name: _gradient(orbit, name, each, events) for name, each in zip(names, found, strict=True)
-    }
+    return Named((n, _gradient(orbit, n, g, events)) for n, g in zip(names, found, strict=True))
 
 
 def _gradient(
@@ -155,7 +154,7 @@ def joint_sensitivities(orbit: Orbit) -> FloatArray:
 
 
 def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:
-    return dict(zip(names, slopes.tolist(), strict=True))
+    return Named(zip(names, slopes.tolist(), strict=True))
 
 
 def _events(orbit: Orbit) -> tuple[str, ...]:

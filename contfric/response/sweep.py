@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.extras import need_xarray
+from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
 from contfric.models.clocks import TICK
@@ -94,7 +95,7 @@ class Sweep(Tabled):
     def params(self) -> dict[str, float]:
         """The parameters that do not vary."""
         named = self.model.mapping(self.vector)
-        return {name: value for name, value in named.items() if name != self.parameter}
+        return Named({name: value for name, value in named.items() if name != self.parameter})
 
     @property
     def up(self) -> SweepRun:
@@ -195,7 +196,7 @@ class Sweep(Tabled):
     @cached_property
     def periods(self) -> dict[str, NDArray[np.int32]]:
         """Periods after which the solution repeats itself, for each direction."""
-        return {name: run.periods for name, run in self.runs.items()}
+        return Named({name: run.periods for name, run in self.runs.items()})
 
     def columns(self) -> Columns:
         """Return one row for each point: direction, parameter, outcome, period, mode, phase, state."""

@@ -1,7 +1,5 @@
 """A certificate file, read and checked."""
 
-from __future__ import annotations
-
 import json
 from itertools import combinations, pairwise, product
 from typing import Any, NamedTuple
@@ -35,11 +33,12 @@ def check_text(text: str) -> Answer:
         moved = {k for p in parts for k, _ in p["params"].items() ^ parts[0]["params"].items()}
         see(parts != [] and len(moved) < 2, "it has parts, all of one diagram")
         stated, orbits, bits = zip(*map(_check, parts), strict=True)
-        for (p, ends, boxes), (q, others, more) in combinations(orbits, 2):
+        for (p, one, boxes), (q, other, more) in combinations(orbits, 2):
+            ends, others = ([x[k][k in y] for k in x] for x, y in ((one, other), (other, one)))
             pairs = [*product(ends, more), *product(others, boxes)] if p == q else []
             see(all(_apart(*pair) for pair in pairs), "no two parts are the same, or overlap")
         counts = [f"{sum(p['certificate'] == name for p in parts)} {name}s" for name in CHECKS]
-        counts += [f"{sum(p.get('ends', []).count(None) for p in parts)} open ends"]
+        counts += [f"{sum(not end for p in parts for end in p.get('ends', []))} open ends"]
         return Answer(True, "", tuple(stated[0] if parts == [data] else counts), max(bits))
     except Exception as error:
         return Answer(False, str(error) if isinstance(error, Refused) else f"damaged: {error!r}")
@@ -103,16 +102,19 @@ def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
     stated = [[k, end[0]] for k, end in ((0, left), (stop, right)) if end]
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
     same = sorted((k * d, k * e) for d, e in knots[0][0].segments for k in {1, knots[0][0].closing})
-    shown = f"{len(data['events'])} events of multipliers"
-    return ["one curve", "admissible", shown], [same, knots[:: stop + 1], boxes]
+    shown, ends = f"{len(data['events'])} events of multipliers", dict[Any, Any]()
+    for k, beside in ((0, 1), (-1, -2)):  # with the next knot, as tubes may go on from one
+        known = str((data["segments"], data["half"], data["periods"], data["knots"][k], ctx.prec))
+        ends[known if points[k].fixed else object()] = knots[k], knots[beside]
+    return ["one curve", "admissible", shown], [same, ends, boxes]
 
 
 def _check_event(data: Any) -> tuple[list[str], list[Any]]:
     kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
-    found, box = events_between(data, a, b, None if at is None else (kind, [at]))
+    (found, box), name = events_between(data, a, b, at and (kind, [at])), data["parameter"]
     see(found == [kind], f"it has those events, not {found}")
     see(value.rad() - abs((near := box.orbits(INSIDE))[0].value - value.mid()), "it is in the ball")
-    return ["exists", f"is a {kind} in {data['parameter']}", "admissible"], [kind, [near], [box]]
+    return ["exists", f"is a {kind} in {name}", "admissible"], [kind, {0: [near] * 2}, [box]]
 
 
 def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
@@ -120,10 +122,9 @@ def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     see(claims == ["exists", *(c for c in CLAIMS if c in claims)], "it states what an orbit is")
     printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
     scene, z = (box := Link(data, [*printed, ball(s)]).proved()).orbits(0)
-    for value, near, r in zip(z, printed, radius, strict=True):
-        see(r - abs(value - near), "it lies in the box around the printed joints")
-    for k, text in enumerate(data["enclosure"]):
-        see(ball(text).contains(z[k] if k % 2 else z[k] / scene.omega), "its ball holds it", False)
+    for k, (c, near, r, text) in enumerate(zip(z, printed, radius, data["enclosure"], strict=True)):
+        see(r - abs(c - near), "it lies in the box around the printed joints")
+        see(ball(text).contains(c if k % 2 else c / scene.omega), "its ball holds it", False)
     if "unique" in claims:
         Link(data, [*printed, ball(s)]).proved([*radius, arb(0)])
     if "admissible" in claims:
@@ -135,7 +136,7 @@ def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
     for d, mu in zip(discs := data["multipliers"], found, strict=bool(discs)):
         see(len(d) == 2 and acb(ball(d["re"]), ball(d["im"])).contains(mu), "its disc", False)
-    return claims + ["multipliers"] * bool(discs), [data["params"], [(scene, z)], [box]]
+    return claims + ["multipliers"] * bool(discs), [data["params"], {0: [(scene, z)] * 2}, [box]]
 
 
 CHECKS = {"event": _check_event, "orbit": _check_orbit, "tube": _check_tube}  # each reads all

@@ -5,8 +5,6 @@ exp(l tau) at the zeros of P; a wave a cos(w t) adds ``Re a exp(i w t_0) exp[l1,
 (exp(i w tau) - C - i w D) / P(i w). Its start changes it by ``dx/dx_0 = C``, ``dx/dt_0 = -x''_0 D``.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

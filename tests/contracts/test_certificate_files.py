@@ -214,6 +214,49 @@ def test_what_is_no_certificate_is_refused(text: str) -> None:
     assert not check_text(text).yes
 
 
+NONE = {
+    b"": "it is empty",
+    b" \n": "it is empty",
+    b"\x80PNG\r\n": "it is no text",
+    b"Omega: 0.5": "it is no JSON file",
+    b"[1, 2]": "it is a JSON file without the entry 'certificate'",
+    b'"certificate"': "it is a JSON file without the entry 'certificate'",
+    b'{"study": "fig05", "seconds": 2.1}': "it is a JSON file without the entry 'certificate'",
+    b'{"certificate": ["orbit"]}': "its entry 'certificate' is none of event, orbit, tube, diagram",
+    b'{"certificate": "tube", "format": 2}': "it has format 2, and format 3 is checked; write it anew",
+    b'{"certificate": "diagram", "checkable": [{"format": 1}]}': "format 1, and format 3 is checked",
+}
+
+
+@pytest.mark.parametrize("content", NONE)
+def test_a_file_that_is_no_certificate_says_so_in_one_line(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.json"
+    path.write_bytes(content)
+    assert main(["verify", str(path)]) == 1
+    printed = capsys.readouterr()
+    (line,) = (printed.out + printed.err).splitlines()
+    assert line.startswith("no: run.json is no certificate: ")
+    assert NONE[content] in line
+
+
+def test_texts_of_a_file_do_not_overwrite_the_answer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part, lie = json.loads(certificate(0)), "\x1b[2K\ryes: 99 orbits\n"
+    file = {"certificate": "diagram", "format": 1, "checkable": [part], "left_out": [lie]}
+    for number, wrong in enumerate(
+        (file, part | {"certificate": "event", "kind": lie, "at": [0, 1]})
+    ):
+        path = tmp_path / f"{number}.json"
+        path.write_text(json.dumps(wrong))
+        main(["verify", str(path)])
+        printed = capsys.readouterr().out
+        assert all(line.isprintable() for line in printed.splitlines())
+        assert not any(line.startswith("yes: 99") for line in printed.splitlines())
+
+
 def test_files_and_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, wrong = tmp_path / "a.json", tmp_path / "b.json"
     orbit(0).certify().save(path)

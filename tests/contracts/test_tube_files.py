@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import contfric as cf
@@ -99,6 +100,60 @@ def test_tubes_do_not_overlap() -> None:
             answer = check_text(json.dumps(file))
             assert answer.yes == (begins > ends), (begins, ends, answer)
             assert answer.yes or answer.why == "false: no two parts are the same, or overlap"
+
+
+def _answer(*parts: dict[str, Any]) -> Any:
+    file = {"certificate": "diagram", "format": 1, "checkable": list(parts)}
+    return check_text(json.dumps(file))
+
+
+def _back(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a tube in the other direction."""
+    last = len(data["knots"]) - 2
+    turned = {name: data[name][::-1] for name in ("knots", "ends")}
+    return data | turned | {"events": [[last - k, kind] for k, kind in data["events"]]}
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_tubes_may_meet_at_a_knot(seed: int) -> None:
+    """One ends where the other begins: nothing is stated twice, in whatever direction each is written."""
+    data, rng = fold(), np.random.default_rng(seed)
+    last, fold_at = len(data["knots"]) - 1, data["events"][0][0]
+    far = [k for k in range(2, last - 1) if abs(k - fold_at) > 8]  # there Omega is kept along boxes
+    at = int(rng.choice(far))
+    first, other = _part(data, max(at - 4, 0), at), _part(data, at, min(at + 3, last))
+    for a in (first, _back(first)):
+        for b in (other, _back(other)):
+            assert _answer(a, b).yes, _answer(a, b)
+            assert _answer(b, a).yes
+    longer = _part(data, at, min(at + 5, last))
+    within = _part(data, at - 1, at)
+    once = "false: no two parts are the same, or overlap"
+    for wrong in ((other, longer), (first, other, longer), (within, first), (first, first)):
+        for parts in (wrong, [_back(wrong[0]), *wrong[1:]], wrong[::-1]):
+            assert _answer(*parts).why == once
+    moved = copy.deepcopy(other)  # begins a little before where the other ends
+    between = zip(data["knots"][at], data["knots"][at - 1], strict=True)
+    moved["knots"][0] = [x + 1e-3 * (y - x) for x, y in between]
+    assert is_verified(moved) and _answer(first, moved).why == once
+
+
+def test_only_orbits_that_are_the_same_are_a_knot_of_both() -> None:
+    """About a fold the orbit next to a knot depends on the next one: an event could be between the two."""
+    data = fold()
+    at = data["events"][0][0]
+    for k in (at, at + 1):
+        assert not _answer(_part(data, k - 3, k), _part(data, k, k + 3)).yes
+    off = copy.deepcopy(data)
+    off["knots"][at + 1] = [c + 1e-6 for c in off["knots"][at + 1]]
+    assert not _answer(_part(off, at - 2, at + 1), _part(off, at + 1, at + 3)).yes
+
+
+def test_every_open_end_is_counted() -> None:
+    data = _part(json.loads(tube("0s", 0.55, 0.4, 0.56)), 3, 6)
+    for end in (None, [], False, "", 0):
+        answer = _answer(data | {"ends": [end, None]})
+        assert not answer.yes or "2 open ends" in answer.statements
 
 
 def test_a_symmetric_tube_and_its_whole_period_are_the_same() -> None:
