@@ -21,9 +21,9 @@ ONLY_GROWS = "something only grows along it, as a slider's offset that slips to 
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
 #: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
-#: A segment this short may have no length: where it touches a surface it is known to the root of rounding, and
-#: a slide to its cube root, as it moves the mass by the third power of its length: 5e-6, and 30 times that over
-#: a slope that is small. Whether it has one is told by what rounding makes of it.
+#: A segment this short may have no length: where it touches a surface it is known to the root of rounding,
+#: and a slide to its cube root, as it moves the mass by the third power of its length: 5e-6, and 30 times
+#: that over a slope that is small. Whether it has one is told by what rounding makes of it.
 _NO_LENGTH = 1e-3
 #: What comes in at an event moves at least by this share of the arclength.
 _NO_SHARE = 1e-2
