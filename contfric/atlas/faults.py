@@ -21,9 +21,12 @@ ONLY_GROWS = "something only grows along it, as a slider's offset that slips to 
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
 #: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
-#: A segment this short is known to the root of rounding only, where it touches a surface; and one that comes
-#: in at an event is longer than this share of the arclength.
-_NO_LENGTH, _NO_SHARE = 1e-6, 1e-2
+#: A segment this short may have no length: where it touches a surface it is known to the root of rounding,
+#: and a slide to its cube root, as it moves the mass by the third power of its length: 5e-6, and 30 times
+#: that over a slope that is small. Whether it has one is told by what rounding makes of it.
+_NO_LENGTH = 1e-3
+#: What comes in at an event moves at least by this share of the arclength.
+_NO_SHARE = 1e-2
 #: A bridge on which the parameter changes by less (relative to 1 + its value) may consist of rounding.
 _NARROW = 1e-5
 #: A branch shorter than this (arclength) is asked whether it is admissible at all: beyond, the march notices.
@@ -99,9 +102,10 @@ def _never_lasts(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
     """Tell whether a segment has no length at any point of a branch: the orbits are those without it.
 
     Where orbits are a continuum those of them that touch a surface solve the equations of an itinerary with a
-    segment there, of no length. A segment that comes in at an event grows at least with the distance.
+    segment there, of no length. So do those that touch two crests of equal height, with a slide in between. A
+    segment that comes in at an event grows at least with the distance.
     """
-    least = min(_NO_LENGTH, _NO_SHARE * branch.arc[-1])
+    least = min(_NO_LENGTH, branch.arc[-1])
     return any(_no_longer(branch, at, range(branch.system.segments), least))
 
 

@@ -54,6 +54,7 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "a narrow bridge whose last margin is nearly reached": ((39, 48),),
     "two slides that vanish together, one of them first on another curve": ((40, 10),),
     "a stick that a slow load makes short, and that still ends in a jump": ((34, 360),),
+    "a slide of no length between two crests of equal height": ((50, 62),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Others with a branch point or a doubling of a bridge.
@@ -105,6 +106,27 @@ def test_a_slow_load_is_known_well_enough_for_its_bridge() -> None:
         ends = [end.bifurcation for b in short for end in b.ends if end.bifurcation is not None]
         width = found.range[1] - found.range[0]
         assert all(event.accuracy * width < 0.01 * np.ptp(short[0].values) for event in ends)
+
+
+def test_no_slide_moves_nothing_all_along_a_branch() -> None:
+    """Two crests of a symmetric force are equally high: a stick that touches both may be held at the second.
+
+    Held at the first as well, it would have to slide in between, and by nothing.
+    """
+    rng = np.random.default_rng(2)
+    scene = {"Omega": 0.1004407, "S": 0.0512191, "S0": 0.0863105, "zeta": 9.54e-4}
+    slides = 0
+    for _ in range(7):
+        params = {name: value * rng.uniform(0.985, 1.015) for name, value in scene.items()}
+        orbit = cf.find_orbit("coulomb", {**params, "h": -0.143}, longest=300)
+        for branch in cf.explore(orbit, "h", (-0.23, -0.13)).branches:
+            x = branch.joints[1:-1, :, 1]
+            moved = np.abs(np.roll(x, -1, axis=1) - x)
+            sliding = [i for i, (mode, _) in enumerate(branch.system.itinerary) if "slide" in mode]
+            within = [i for i in sliding if i + 1 < moved.shape[1]]  # a half ends at its image
+            assert np.all(moved[:, within].max(axis=0) > 1e-9), (params, branch.name)
+            slides += len(within)
+    assert slides > 300
 
 
 def test_a_doubling_just_before_a_tangential_release() -> None:
