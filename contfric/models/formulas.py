@@ -221,7 +221,10 @@ def _at(formula: Any, moving: Collection[Any], shift: int) -> Any:
 def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
     """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
     parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
-    return sorted({x for x in parts if x.free_symbols & set(moving)}, key=str)
+    signs = {
+        sign: sympy.Integer(1) for sign in expression.atoms(Sign)
+    }  # where only these change, they are parts
+    return sorted({x for x in parts if x.xreplace(signs).free_symbols & set(moving)}, key=str)
 
 
 #: Functions that have values and limits at all numbers, and no jumps.
