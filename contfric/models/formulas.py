@@ -12,6 +12,7 @@ This module imports sympy; it is loaded when a model is built for the first time
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 import sys
 from collections.abc import Collection, Mapping
@@ -164,7 +165,8 @@ def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any])
     """Return a formula where the signs of some parts are known: kinks that a mode does not see.
 
     What is a known part times a factor of parameters, ``s/phi - 1`` of ``s - phi``, has its sign times that
-    of the factor; what depends on such a sign is looked at for either.
+    of the factor; what depends on such a sign is looked at for either. Above d and -d, as a dead zone has
+    them, x is their mean; between them ``abs(x) - d`` has one sign, whichever x has.
 
     Parameters
     ----------
@@ -172,16 +174,33 @@ def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any])
     moving : the symbols that are no parameters
     """
     moved = set(moving)
+    known = {x: sign for x, sign in signs.items() if x.free_symbols & moved}
+
+    def ratio(x: Any) -> Any:
+        """Return the sign of a known part, or of the sum of two that have theirs, times a factor."""
+        sums = (
+            (s * x1 + r * x2, 1) for (x1, s), (x2, r) in itertools.combinations(known.items(), 2)
+        )
+        factors = (
+            (_factor(x, k, tuple(moving)), s) for k, s in itertools.chain(known.items(), sums)
+        )
+        factor, s = next(((f, s) for f, s in factors if f != 0), (0, 0))
+        return -s * Sign(-factor) if s and factor.could_extract_minus_sign() else s * Sign(factor)
 
     def side(x: Any) -> Any:
         if not x.free_symbols & moved:
             return Sign(x)
-        either = next((w for w in x.atoms(Where) if not w.args[0].free_symbols & moved), None)
-        if either is not None:
-            up, down = (side(x.xreplace({either: part})) for part in either.args[1:])
-            return 0 if 0 in (up, down) else Where(either.args[0], up, down)
-        ratios = ((_factor(x, known, tuple(moving)), sign) for known, sign in signs.items())
-        return next((sign * Sign(ratio) for ratio, sign in ratios if ratio != 0), 0)
+        found, inner = ratio(x), min(x.atoms(Abs, Sign, Where), key=str, default=None)
+        if found != 0 or inner is None:
+            return found
+        up, down = (side(x.xreplace({inner: part})) for part in _either(inner))
+        if (
+            isinstance(inner, Where)
+            and not inner.args[0].free_symbols & moved
+            and 0 not in (up, down)
+        ):
+            return Where(inner.args[0], up, down)
+        return up if up == down else 0
 
     swaps: dict[Any, Any] = {}
     for part in expression.atoms(Sign, Abs, Where):
@@ -195,6 +214,14 @@ def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any])
         else:
             swaps[part] = Where(s, *part.args[1:])
     return resolved(expression.xreplace(swaps), signs, moving) if swaps else expression
+
+
+def _either(kink: Any) -> tuple[Any, Any]:
+    """Return what a kink is on one side, and on the other."""
+    if isinstance(kink, Where):
+        return kink.args[1], kink.args[2]
+    size = kink.args[0] if isinstance(kink, Abs) else sympy.Integer(1)
+    return size, -size
 
 
 @lru_cache(maxsize=4096)
@@ -221,7 +248,10 @@ def _at(formula: Any, moving: Collection[Any], shift: int) -> Any:
 def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
     """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
     parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
-    return sorted({x for x in parts if x.free_symbols & set(moving)}, key=str)
+    signs = {
+        sign: sympy.Integer(1) for sign in expression.atoms(Sign)
+    }  # where only these change, they are parts
+    return sorted({x for x in parts if x.xreplace(signs).free_symbols & set(moving)}, key=str)
 
 
 #: Functions that have values and limits at all numbers, and no jumps.

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.models.products import of_product
+from contfric.models.products import difference, of_product
 
 T = TypeVar("T")
 
@@ -335,22 +335,18 @@ class Scope(Generic[T]):
                 found = self._branch(part, yes if either else found, found if either else no)
             return found
         assert isinstance(condition, ast.Compare)
-        sides: list[Any] = [self.evaluate(s) for s in (condition.left, *condition.comparators)]
-        found = yes
+        sides, found = [condition.left, *condition.comparators], yes
         for index in reversed(range(len(condition.ops))):
-            found = self._compared(condition.ops[index], sides[index], sides[index + 1], found, no)
+            found = self._compared(condition.ops[index], sides[index : index + 2], found, no)
         return found
 
-    def _compared(self, operator: ast.cmpop, left: Any, right: Any, yes: T, no: T) -> T:
+    def _compared(self, operator: ast.cmpop, sides: list[ast.expr], yes: T, no: T) -> T:
         """Choose by one comparison; ``a >= b`` is asked for as ``b > a``, with the outcomes exchanged."""
-        where = self.algebra.where
-        if isinstance(operator, ast.Gt):
-            return where(left - right, yes, no)
-        if isinstance(operator, ast.Lt):
-            return where(right - left, yes, no)
-        if isinstance(operator, ast.GtE):
-            return where(right - left, no, yes)
-        return where(left - right, no, yes)
+        above = isinstance(operator, (ast.Gt, ast.LtE))
+        left, right = sides if above else reversed(sides)
+        if isinstance(operator, (ast.GtE, ast.LtE)):
+            yes, no = no, yes
+        return self.algebra.where(difference(self, left, right), yes, no)
 
 
 def _real_power(base: float, exponent: float) -> float:

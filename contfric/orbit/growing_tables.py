@@ -19,6 +19,7 @@ from contfric.orbit.tables import (
     declared_surfaces,
     flight_table,
     moves_on,
+    side_table,
     sides_of,
     surfaces_under,
 )
@@ -104,6 +105,7 @@ class GrowingTables:
             0,
             chatter_table(model, done),
             flight_table(model, done),
+            side_table(model, done),
         )
 
     def _write(self, name: str) -> None:

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from sympy import Symbol
 from typed import typed
 
 import contfric as cf
-from contfric.models.grammar import number_of, parse
+from contfric.models.formulas import FORMULAS, formula, kinks_in
+from contfric.models.grammar import Scope, number_of, parse
 from contfric.models.products import factors
 
 #: A spring that is stiffer while it is loaded (Reid 1956), with a little viscous damping.
@@ -32,6 +34,7 @@ symmetry: x -> -x, v -> -v, t -> t + T/2
 """
 LAWS = (
     "F*cos(w*t) - c*v - x*(1 + g*sign(power))",
+    pytest.param('"F*cos(w*t) - c*v - x*where(-x*v >= 0, 1 - g, 1 + g)"', marks=pytest.mark.slow),
     pytest.param("F*cos(w*t) - c*v - x - g*abs(x*v)/v", marks=pytest.mark.slow),
 )
 
@@ -67,5 +70,15 @@ def test_the_sign_of_a_product_is_that_of_its_factors() -> None:
         assert number_of(f"abs({text})", values) == pytest.approx(
             abs(number_of(text, values)), rel=1e-15
         )
+        above = number_of(text, values) > 0
+        for condition in (f"{text} > 0", f"0 < {text}", f"not {text} <= 0", f"-({text}) < 0"):
+            assert number_of(f"where({condition}, 1, 0)", values) == above
     ring = {"p": parse("2*q"), "q": parse("p/3")}
     assert len(factors(ast.Name("p"), ring)) == 3  # 2, p, 3: what is defined by itself ends
+
+
+def test_a_condition_on_a_product_has_the_kinks_of_its_factors() -> None:
+    tree = parse("where(x*v >= 0, 1, 2) + abs(x*sign(v))")
+    names = {name: Symbol(name) for name in "xv"}
+    kinks = kinks_in(formula(tree, Scope(FORMULAS, {**names})), names.values())
+    assert [str(kink) for kink in kinks] == ["v", "x"]
