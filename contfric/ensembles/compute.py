@@ -124,7 +124,7 @@ def ensemble(
             "an ensemble of a model takes parameter, range and distributions: ensemble(model, 'Omega', "
             "(0.4, 0.6), {'S': (0.3, 0.34)}); one of a study takes ensemble('study.yaml', samples)"
         )
-    model, given = tied(cast(ModelSource, model), params)
+    model, fixed = tied(cast(ModelSource, model), params)
     check_executor(executor)
     function_of("progress", progress)
     model.index_of(parameter)
@@ -137,7 +137,7 @@ def ensemble(
     limits = {"max_periods": max_periods, "copies": copies}
     limits |= {"max_branches": max_branches, "max_points": max_points}
     options = _options(bridges, limits, max_step)
-    vector = _vector(model, given, parameter, bounds, varied)
+    vector = _vector(model, fixed, parameter, bounds, varied)
     drawn = varied.draw(whole_number("seed", seed, least=0), count)
     vectors = np.tile(vector, (count, 1))
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
