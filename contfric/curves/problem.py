@@ -121,10 +121,7 @@ def check_start(bifurcation: Bifurcation, box: PlaneRanges) -> None:
         raise ParameterError(
             f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not"
         )
-    here = np.array([orbit.params[name] for name in box.names])
-    if not box.contains(here):
-        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
-        raise ParameterError(f"{kind.value} is at {where}, outside of the ranges")
+    box.check_holds(kind.value, orbit.params)
 
 
 def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
