@@ -58,11 +58,9 @@ def null_vector(orbit: Orbit) -> FloatArray:
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 
 
-def leave_branch_point(
-    orbit: Orbit, settings: Settings, reason: str, distance: float = LEAVE
-) -> BranchStart | None:
-    """Return a start on the branch that leaves a singular orbit along its null vector."""
-    return leave_along(orbit, settings, Direction(null_vector(orbit), 0.0), reason, distance)
+def null_direction(orbit: Orbit) -> Direction:
+    """Return the direction of the null vector of a singular orbit, in which the parameter stands."""
+    return Direction(null_vector(orbit), 0.0)
 
 
 @foreseeable()
@@ -94,7 +92,7 @@ def overshoots(
     settings: Settings,
     departure: BranchStart,
     distance: float,
-    direction: Direction | None = None,
+    along: Direction,
 ) -> bool:
     """Tell whether a start lies behind something that belongs to the branch, too.
 
@@ -103,7 +101,6 @@ def overshoots(
     """
     from contfric.continuation.steps import CHI_MINUS
 
-    along = direction or Direction(null_vector(orbit), 0.0)
     nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
     if nearer is None:
         return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at
