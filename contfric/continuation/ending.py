@@ -92,7 +92,7 @@ def equilibrium_met(orbit: Orbit) -> str | None:
         return None
     size = float(np.max(np.ptp(np.vstack([orbit.begins, orbit.ends])[:, 1:], axis=0)))
     for i, (mode, exit_) in enumerate(orbit.itinerary):
-        lasts = float(orbit.ends[i, 0] - orbit.begins[i, 0])
+        lasts = float(orbit.durations[i])
         stands = orbit.model.is_at_rest(mode) or mode in orbit.model.chatter_by_mode
         if stands or lasts < SHORT * orbit.period:
             continue

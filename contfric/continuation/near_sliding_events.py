@@ -87,7 +87,7 @@ def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) ->
 
 def _comes_in(here: Orbit) -> bool:
     """Tell whether a segment has no length at an event."""
-    return bool(np.min(here.ends[:, 0] - here.cycle[:, 0]) < NO_LENGTH)
+    return bool(np.min(here.durations) < NO_LENGTH)
 
 
 def _if_finite(point: Point | None) -> Point | None:

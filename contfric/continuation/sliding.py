@@ -142,7 +142,7 @@ def _pulled_in(
 
 def _is_inside(here: Orbit) -> bool:
     """Tell whether no margin is negative, and no segment lasts less than nothing."""
-    lasts = here.ends[:, 0] - here.cycle[:, 0]
+    lasts = here.durations
     return bool(lasts.min() >= 0.0 and here.margins.min(initial=0.0) > -_NEGATIVE)
 
 
@@ -164,10 +164,7 @@ def _stop_after(here: Orbit, point: Point, first: int) -> int:
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    if (
-        ends_rest(here.model, *here.itinerary[i])
-        or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period
-    ):
+    if ends_rest(here.model, *here.itinerary[i]) or here.durations[i] > _VANISHED * here.period:
         return first
     return _stop_before(here, point, i, first)
 
@@ -228,7 +225,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     # a hold ends at a load, as rest does: nothing slides up to it
     if limit != first or not here.model.filippov or is_hold(here.itinerary[i][1]):
         return limit
-    if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
+    if here.durations[i] <= _VANISHED * here.period:
         return first
     for k, other in enumerate(tests):
         tangential = other.margin is Margin.EXIT and abs(point.tests[k]) < _NEARLY_REACHED

@@ -212,7 +212,7 @@ def prove(
         free, still = pinned[~held], np.sort(pinned[held])
         others = np.ones(len(margins), dtype=np.bool_)
         others[still] = False
-        lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
+        lasts = bool(np.all(orbit.durations > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
         if not born and is_continuum(problem, start) and is_continuum(problem, beside):
