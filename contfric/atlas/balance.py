@@ -318,7 +318,7 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
     chord = (other.joints - one.joints) / length
     point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)
-    return None if point is None else point.orbit(branch.system, branch.vector, active)
+    return None if point is None else point.orbit(branch, active)
 
 
 def _extent(branch: Branch) -> tuple[float, float]:

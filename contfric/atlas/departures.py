@@ -77,7 +77,7 @@ def _departures(
         departure = leave_along(orbit, settings, along, reason.value, distance)
         if departure is None or violates(departure.point):
             continue  # nothing is there, or a condition has been violated on the way
-        there = departure.point.orbit(orbit.system, orbit.vector, active)
+        there = departure.point.orbit(orbit, active)
         if shortest(there) is not there:
             continue  # Newton has fallen back on the orbit that it is to leave
         found, again = known(there), distance in overshot

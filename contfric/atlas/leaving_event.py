@@ -126,7 +126,7 @@ def _ways(
         if any(_is_along(start, known_way, settings) for known_way in tried):
             continue
         tried.append(start)
-        there = start.orbit(orbit.system, orbit.vector, active)
+        there = start.orbit(orbit, active)
         for point in (start, start.reversed()):
             yield there, _trace(there, point, settings, first_step, progress)
 
@@ -166,7 +166,7 @@ def _leave_beside(
             point = first_point(moved, settings, tangent, slope)
             if point is None:
                 continue
-            there = point.orbit(orbit.system, orbit.vector, active)
+            there = point.orbit(orbit, active)
             if not _is_beside(there, moved, orbit):
                 continue
             if float(np.sum(away * point.tangent)) < 0.0:

@@ -218,7 +218,7 @@ def short_branch(
     test, distance = found
     points = [curve.point(a) for a in (0.0, 0.5 * distance, distance)]
     active = orbit.model.index_of(settings.parameter)
-    here = points[-1].orbit(orbit.system, orbit.vector, active)
+    here = points[-1].orbit(orbit, active)
     kind = kind_of_margin(orbit.system, orbit.system.tests[test], here)
     if kind not in TERMINAL:
         return None

@@ -60,7 +60,7 @@ def with_holds_forward(
     if solved is None:
         return point, here, first
     moved = float(np.abs(solved.joints - here.joints).max())
-    there = solved.orbit(here.system, here.vector, here.model.index_of(settings.parameter))
+    there = solved.orbit(here, here.model.index_of(settings.parameter))
     last = float(np.min(there.durations))
     if moved > _NEAR * float(np.max(-lasts[back])) or last < 0.0 or not there.admissible:
         return point, here, first

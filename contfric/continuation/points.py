@@ -25,6 +25,7 @@ from contfric.orbit.system import IntArray, System
 from contfric.quantities.registry import number_quantity
 
 if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
     from contfric.continuation.geometry import Points
 
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
@@ -139,15 +140,15 @@ class Point:
         """The rate of the parameter of a branch."""
         return float(self.direction[0])
 
-    def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
-        """Return the point of a branch as an orbit; the same one for the same question."""
-        asked, own = (system, vector, active, self.joints, self.w), vars(self)
+    def orbit(self, of: Orbit | Branch, active: int) -> Orbit:
+        """Return the point of the branch through an orbit as an orbit; the same one for the same question."""
+        asked, own = (of.system, of.vector, active, self.joints, self.w), vars(self)
         last: tuple[tuple[object, ...], Orbit] | None = own.get("_orbit")
         if last is not None and all(map(operator.is_, asked, last[0])):
             return last[1]
-        full = vector.copy()
+        full = of.vector.copy()
         full[active] = self.w[0]
-        found = Orbit(system, self.joints.copy(), full, 0.0)
+        found = Orbit(of.system, self.joints.copy(), full, 0.0)
         own["_orbit"] = asked, found
         return found
 

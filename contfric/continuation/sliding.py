@@ -129,12 +129,12 @@ def _pulled_in(
     margin that was zero to either side of it.
     """
     active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit.system, orbit.vector, active)
+    here = point.orbit(orbit, active)
     if point.lost or _is_inside(here):
         return point, here
     for back in _BACK:
         nearer = point_before(here, point, back, settings)
-        there = None if nearer is None else nearer.orbit(orbit.system, orbit.vector, active)
+        there = None if nearer is None else nearer.orbit(orbit, active)
         if nearer is not None and there is not None and _is_inside(there):
             return nearer, there
     return point, here
@@ -305,7 +305,7 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     The ends of two holds are singular each (a hold without acceleration moves nothing), and together
     they stop Newton at the root of rounding; as does a stick that vanishes at a tangential release.
     """
-    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = tip.orbit(orbit, orbit.model.index_of(settings.parameter))
     near = [
         test
         for test, value in zip(orbit.system.tests, tip.tests, strict=False)

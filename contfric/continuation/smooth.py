@@ -110,7 +110,7 @@ def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> 
     left = float(fold.orbit.margins.min(initial=np.inf))
     if fold.kind is not Kind.SN or not (fold.located and left < _OUTSIDE):
         return False
-    here = before.orbit(orbit.system, orbit.vector, active)
+    here = before.orbit(orbit, active)
     return left < _FALLEN * float(here.margins.min(initial=np.inf))
 
 
@@ -161,7 +161,7 @@ def _at_multiplier(
     elif column == CHI_MINUS and not orbit.system.half:
         kind = Kind.PD
     active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit.system, orbit.vector, active)
+    here = point.orbit(orbit, active)
     if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
         return []  # the fold there says what it is; near it chi(1) is rounding
     event = bifurcation_at(kind, here, before, beyond, point, settings)
@@ -178,7 +178,7 @@ def _passes_vertex(
         return False
     active = orbit.model.index_of(settings.parameter)
     between = parabola_vertex(before, after, share)
-    return _is_vertex(between.orbit(orbit.system, orbit.vector, active), active)
+    return _is_vertex(between.orbit(orbit, active), active)
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:
@@ -195,7 +195,7 @@ def _overshot(
     """
     if after.arc - before.arc <= SHORTEST_OVERSHOOT:
         return not_located(orbit, kind, before, beyond, settings)
-    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
     found = bifurcation_at(kind, here, before, beyond, before, settings)
     return found, altered(before, lost=True)
 
@@ -231,7 +231,7 @@ def _changes(
     ):
         found.append(not_located(orbit, Kind.T, before, after, settings))
     for point in locations:
-        here = point.orbit(orbit.system, orbit.vector, active)
+        here = point.orbit(orbit, active)
         if here.margins.min(initial=0.0) < -_OUTSIDE:
             continue  # where curves cross a trial may lie on another one
         test = EventFunction(*_label_location(orbit, k))
@@ -276,7 +276,7 @@ def _undone(
 
 def _along(orbit: Orbit, point: Point, distance: float, settings: Settings) -> Orbit:
     """Return the orbit at a distance along the tangent of a point, not solved."""
-    here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
     vector = here.vector.copy()
     vector[orbit.model.index_of(settings.parameter)] += distance * point.slope
     return altered(here, joints=here.joints + distance * point.tangent, vector=vector)
@@ -291,7 +291,7 @@ def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) ->
     """Tell whether the segment of a label, or one next to it, has no length at one of two points."""
     i, n = int(orbit.system.layout.labels[k][0]), orbit.system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
-    motions = (point.orbit(orbit.system, orbit.vector, active) for point in points)
+    motions = (point.orbit(orbit, active) for point in points)
     return any(np.any((m.ends - m.cycle)[near, 0] < NO_LENGTH) for m in motions)
 
 
@@ -301,7 +301,7 @@ def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
     At an event it does, and where that is known to the root of rounding what the segment crosses is, too.
     """
     i, c, came, goes = (int(number) for number in orbit.system.layout.labels[k][:4])
-    model, here = orbit.model, point.orbit(orbit.system, orbit.vector, active)
+    model, here = orbit.model, point.orbit(orbit, active)
     observable = model.observables[c].name
     for joint, own in ((here.begins[i], came), (here.ends[i], goes)):
         value = here.flow.observe(observable, float(joint[0]), joint[1:])

@@ -60,7 +60,7 @@ def _at_values(before: Point, after: Orbit, active: int) -> Orbit | None:
 
 def _along_chord(before: Point, after: Orbit, settings: Settings, active: int) -> Orbit | None:
     """Return the vertex between two orbits, the orbits between being normal to their chord."""
-    low = _simpler(before.orbit(after.system, after.vector, active))
+    low = _simpler(before.orbit(after, active))
     high = _simpler(after)
     if low is None or high is None or low.joints.shape != high.joints.shape:
         return None
@@ -76,7 +76,7 @@ def _along_chord(before: Point, after: Orbit, settings: Settings, active: int) -
         vector[active] += share * rise
         guess = replace(low, joints=low.joints + share * chord, vector=vector)
         point = first_point(guess, plain, chord / length, rise / length)
-        return None if point is None else point.orbit(low.system, low.vector, active)
+        return None if point is None else point.orbit(low, active)
 
     return _vanishing(between)
 

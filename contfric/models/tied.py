@@ -111,7 +111,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
         If a tie is not an expression of other parameters.
     """
     from contfric.errors import ModelError
-    from contfric.models.entries import EntryError
+    from contfric.models.entries import EntryError, constraints_in
     from contfric.models.grammar import names_in, parse
 
     given = data.get("parameters")
@@ -135,9 +135,6 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
                 ("parameters", name),
                 f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
             )
-    constraints = data.get("constraints") or {}
-    if not isinstance(constraints, Mapping):
-        constraints = dict.fromkeys(map(str, constraints), "")
     whole: dict[str, Any] = {
         "define": {},
         "observables": {},
@@ -149,7 +146,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
     plain = {
         **whole,
         **{k: v for k, v in data.items() if v is not None},
-        "constraints": constraints,
+        "constraints": constraints_in(data),
     }
     return _substituted(plain, ties)
 

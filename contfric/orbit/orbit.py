@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -361,9 +361,8 @@ class Orbit(MeasuredOrbit):
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""
         times, states, names = self.trajectory(points)
-        columns: dict[str, Any] = {"t": times}
-        columns |= {name: states[:, k] for k, name in enumerate(self.model.states)}
-        return as_table({**columns, "domain": names})
+        columns = dict(zip(self.model.states, states.T, strict=True))
+        return as_table({"t": times, **columns, "domain": names})
 
     def certify(self) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).

@@ -192,7 +192,7 @@ def test_a_start_behind_a_doubling_leaps() -> None:
     side = trace_side(orbit, start.point, settings)
     (doubling, *_) = [b for b in side.bifurcations if b.kind is cf.Kind.PD]
     for k in (20, side.count - 20):
-        point = first_point(side.rows.point(k).orbit(orbit.system, orbit.vector, 3), settings)
+        point = first_point(side.rows.point(k).orbit(orbit, 3), settings)
         assert point is not None
         behind = point.value > doubling.params["A"]
         assert overshoots(orbit, settings, replace(start, point=point), LEAVE, along) is behind
@@ -231,7 +231,7 @@ def test_newton_settles_at_the_rounding_of_an_integrated_flow(distance: float) -
     settings = settings_of(orbit, "A", (19.0, 24.0), None, True, 5000)
     start = leave_along(orbit, settings, null_direction(orbit), "BP", distance)
     assert start is not None
-    there = start.point.orbit(orbit.system, orbit.vector, 3)
+    there = start.point.orbit(orbit, 3)
     apart = np.linalg.norm(there.joints - orbit.joints) / len(orbit.joints) ** 0.5
     assert apart == pytest.approx(distance, rel=1e-2)
     assert abs(start.point.value - event.params["A"]) < 1e-6 + distance**2
