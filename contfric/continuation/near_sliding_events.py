@@ -81,8 +81,7 @@ def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) ->
     pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
     if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
         return before
-    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
-    return _if_finite(point_before(here, before, -SAME_LOCATION, settings)) or before
+    return _if_finite(point_before(orbit, before, -SAME_LOCATION, settings)) or before
 
 
 def _comes_in(here: Orbit) -> bool:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.attributes import altered
 from contfric.errors import (
     ParameterError,
     checked_range,
@@ -152,6 +153,11 @@ class Point:
         own["_orbit"] = asked, found
         return found
 
+    def along(self, of: Orbit | Branch, active: int, distance: float) -> Orbit:
+        """Return the orbit at a distance along the tangent, not solved."""
+        here = self.orbit(of, active)
+        return displaced(here, active, distance * self.tangent, distance * self.slope)
+
     def as_start(self) -> tuple[FloatArray, FloatArray]:
         """Return (joints, tangent) and (parameters, direction) as the march takes them."""
         return np.array([self.joints, self.tangent]), np.array([self.w, self.direction])
@@ -284,6 +290,13 @@ class PointRows:
         self.tangents[k], self.directions[k] = point.tangent, point.direction
         self.tests[k], self.labels[k] = point.tests, point.labels
         self.mu[k], self.arc[k] = point.mu, point.arc
+
+
+def displaced(orbit: Orbit, active: int, joints: FloatArray, rise: float) -> Orbit:
+    """Return an orbit, not solved, of which the joints and one parameter have moved by this much."""
+    vector = orbit.vector.copy()
+    vector[active] += rise
+    return altered(orbit, joints=orbit.joints + joints, vector=vector)
 
 
 def next_to(orbit: Orbit, settings: Settings, share: float) -> Orbit | None:

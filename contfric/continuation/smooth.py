@@ -138,9 +138,7 @@ def _change_next_to(
     orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
 ) -> float:
     """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = point.value + shift * point.slope
-    moved = Orbit(orbit.system, point.joints + shift * point.tangent, vector, np.inf)
+    moved = point.along(orbit, orbit.model.index_of(settings.parameter), shift)
     near = first_point(moved, settings, point.tangent, point.slope)
     return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
 
@@ -250,6 +248,7 @@ def _undone(
     """
     from contfric.continuation.bracket import BY_PARAMETER
 
+    active = orbit.model.index_of(settings.parameter)
     found: list[Located] = []
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
     for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
@@ -257,7 +256,7 @@ def _undone(
             continue
         sides = [(one, _NEARBY)] * near + [(other, -_NEARBY)] * far
         for point, share in sides:
-            asked = _along(orbit, point, share * (other.arc - one.arc), settings).labels
+            asked = point.along(orbit, active, share * (other.arc - one.arc)).labels
             if not ((before.labels == after.labels) & (asked != before.labels)).any():
                 continue
             value = point.value + share * (other.value - one.value)
@@ -272,14 +271,6 @@ def _undone(
                 ]
                 found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
     return found
-
-
-def _along(orbit: Orbit, point: Point, distance: float, settings: Settings) -> Orbit:
-    """Return the orbit at a distance along the tangent of a point, not solved."""
-    here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
-    vector = here.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] += distance * point.slope
-    return altered(here, joints=here.joints + distance * point.tangent, vector=vector)
 
 
 def _apart(one: Located, other: Located) -> bool:

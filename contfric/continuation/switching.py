@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.continuation.crossing import Direction
-from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.points import EXTRA, Point, Settings, displaced
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
@@ -69,10 +69,8 @@ def leave_along(
 ) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
     origin = first_point(orbit, settings)
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] += distance * direction.slope
-    joints = orbit.joints + distance * direction.joints
-    moved = replace(orbit, joints=joints, vector=vector)
+    active = orbit.model.index_of(settings.parameter)
+    moved = displaced(orbit, active, distance * direction.joints, distance * direction.slope)
     point = first_point(moved, settings, direction.joints, direction.slope)
     if point is None:
         return None

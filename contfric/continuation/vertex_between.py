@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.doubling_point import moved, opening
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.side import first_point
 from contfric.continuation.vertices import joints_like, symmetrised, undoubled
 from contfric.orbit.orbit import Orbit
@@ -72,9 +72,7 @@ def _along_chord(before: Point, after: Orbit, settings: Settings, active: int) -
     plain = replace(settings, stability=False)
 
     def between(share: float, _: Orbit | None) -> Orbit | None:
-        vector = low.vector.copy()
-        vector[active] += share * rise
-        guess = replace(low, joints=low.joints + share * chord, vector=vector)
+        guess = displaced(low, active, share * chord, share * rise)
         point = first_point(guess, plain, chord / length, rise / length)
         return None if point is None else point.orbit(low, active)
 
