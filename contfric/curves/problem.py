@@ -16,6 +16,7 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.system import EventFunction, IntArray, Margin, System
 
 if TYPE_CHECKING:
@@ -243,8 +244,7 @@ def tangency(orbit: Orbit, test: EventFunction) -> tuple[int, int, str]:
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]
     start, end = orbit.begins[segment], orbit.ends[segment]
-    mode, duration = orbit.itinerary[segment][0], float(end[0] - start[0])
-    _, values = orbit.flow.stationary(mode, test.surface, float(start[0]), start[1:], duration)
+    _, values = stationary_within(orbit, segment, test.surface)
     reached: list[tuple[float, int, str]] = []
     entry, exit_ = orbit.itinerary[segment - 1][1], orbit.itinerary[segment][1]
     ends = {START: (start, entry), JOINT: (end, exit_)}
