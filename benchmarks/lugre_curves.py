@@ -45,7 +45,7 @@ def starts(
                 settings = settings_of(moved, name, bounds, None, True, POINTS)
                 point = first_point(moved, settings, phi, 0.0)
                 if point is not None:
-                    yield refine(point.orbit(orbit.system, orbit.vector, active), damped=False)
+                    yield refine(point.orbit(orbit, active), damped=False)
                 continue
             vector = orbit.vector.copy()
             vector[active] += sign * distance * width

@@ -108,7 +108,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
     Events at the two ends of a continuum are one location, and so are those whose parameters are not to be
     told apart: all that leaves them is summed together.
     """
-    width = diagram.range[1] - diagram.range[0]
+    width = diagram.width
     for number, node in enumerate(diagram.nodes):
         b = node.bifurcation
         if node.mirrored or b.kind in (Kind.T, Kind.NS) or not b.located:
@@ -205,7 +205,7 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
     Those that agree to their accuracies, and those that parts of branches join to them on which there is no
     orbit on either side: continua, and parts along which the parameter changes by less than it is known to.
     """
-    b, width = diagram.nodes[number].bifurcation, diagram.range[1] - diagram.range[0]
+    b, width = diagram.nodes[number].bifurcation, diagram.width
     found = [number]
     for k, node in enumerate(diagram.nodes):
         if k == number or node.mirrored:
@@ -223,8 +223,7 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
 
 def _slack(diagram: Diagram, nodes: list[int]) -> float:
     """Return how near to events orbits are on no side of them."""
-    width = diagram.range[1] - diagram.range[0]
-    return max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * width for k in nodes)
+    return max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * diagram.width for k in nodes)
 
 
 def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterator[tuple[int, int]]:
@@ -248,27 +247,25 @@ def _families(
     diagram: Diagram, node: Node, value: float, slack: float
 ) -> Iterator[tuple[int, Orbit]]:
     """Yield (side, orbit) for each half-branch that meets an event."""
-    width = diagram.range[1] - diagram.range[0]
     for i in node.branches:
         branch = diagram.branches[i]
         if is_continuum(branch):
             continue
         for position in _positions(diagram, node, branch):
             for way in (-1, 1):
-                found = _beside(branch, position, way, value, slack, width)
+                found = _beside(branch, position, way, value, slack, diagram.width)
                 if found is not None:
                     yield found
 
 
 def _positions(diagram: Diagram, node: Node, branch: Branch) -> list[float]:
     """Return the locations along a branch at which it meets an event."""
-    width = diagram.range[1] - diagram.range[0]
     b = node.bifurcation
     images = (b, b.mirror()) if branch.mirrored and b.orbit.model.symmetry is not None else (b,)
     return [
         _position(branch, e)
         for e in branch.bifurcations
-        if any(same_event(e, image, diagram.parameter, width) for image in images)
+        if any(same_event(e, image, diagram.parameter, diagram.width) for image in images)
     ]
 
 
@@ -321,7 +318,7 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
     chord = (other.joints - one.joints) / length
     point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)
-    return None if point is None else point.orbit(branch.system, branch.vector, active)
+    return None if point is None else point.orbit(branch, active)
 
 
 def _extent(branch: Branch) -> tuple[float, float]:
@@ -351,9 +348,8 @@ def index_sums(diagram: Diagram) -> Iterator[IndexSum]:
         return
     low, high = _covered(diagram)
     locations = sorted({low, high, *(b.params[diagram.parameter] for b in diagram.bifurcations)})
-    width = diagram.range[1] - diagram.range[0]
     for a, b in pairwise(locations):
-        if b - a < _APART * width:
+        if b - a < _APART * diagram.width:
             continue
         for share in _SHARES:
             value = a + share * (b - a)

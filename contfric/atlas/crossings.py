@@ -57,7 +57,7 @@ def _follow_through(
         if start is None or not settings.low <= start.point.value <= settings.high:
             continue
         active = orbit.model.index_of(settings.parameter)
-        there = refine(start.point.orbit(orbit.system, orbit.vector, active), damped=False)
+        there = refine(start.point.orbit(orbit, active), damped=False)
         if not (there.converged and there.admissible):
             continue
         if not state.knows(event, reason, there):

@@ -35,7 +35,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
 
     And two conditions at once.
     """
-    parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
+    parameter, width = diagram.parameter, diagram.width
     values = sorted(
         (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
     )

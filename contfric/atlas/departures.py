@@ -20,7 +20,7 @@ from contfric.continuation.switching import (
     NEARER,
     BranchStart,
     leave_along,
-    null_vector,
+    null_direction,
     overshoots,
 )
 from contfric.continuation.trace import trace_side
@@ -71,13 +71,13 @@ def _departures(
 ) -> Iterator[tuple[BranchStart, float, int | None]]:
     """Yield departures with their distances, and the branch that is there if it is known."""
     active = orbit.model.index_of(settings.parameter)
-    along = direction or Direction(null_vector(orbit), 0.0)
+    along = direction or null_direction(orbit)
     overshot: list[float] = []
     for distance in chain(NEARER, overshot):  # those that overshoot something come last
         departure = leave_along(orbit, settings, along, reason.value, distance)
         if departure is None or violates(departure.point):
             continue  # nothing is there, or a condition has been violated on the way
-        there = departure.point.orbit(orbit.system, orbit.vector, active)
+        there = departure.point.orbit(orbit, active)
         if shortest(there) is not there:
             continue  # Newton has fallen back on the orbit that it is to leave
         found, again = known(there), distance in overshot

@@ -146,6 +146,11 @@ class Diagram(Shown):
     verification: Verification | None = field(default=None, repr=False)
 
     @property
+    def width(self) -> float:
+        """Width of the range: what lengths along the parameter are compared with."""
+        return self.range[1] - self.range[0]
+
+    @property
     def events(self) -> tuple[Node, ...]:
         """Every event once (symmetry images are not listed), in the order of the parameter."""
         found = [node for node in self.nodes if not node.mirrored]

@@ -90,7 +90,7 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
     if guess is None:
         return None
     found = refine(guess)
-    lasts = found.ends[:, 0] - found.cycle[:, 0]
+    lasts = found.durations
     k = int(np.argmin(lasts))
     if found.converged and not found.admissible and lasts[k] < 0.0:
         for times in _LONGER:
@@ -106,14 +106,10 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
         vector = orbit.vector + times * (found.vector - orbit.vector)
         joints = orbit.joints + times * (found.joints - orbit.joints)
         farther = refine(Orbit(orbit.system, joints, vector, np.inf))
-        lasts = farther.ends[:, 0] - farther.cycle[:, 0]
-        if farther.converged and farther.admissible and lasts[k] > 0.5 * times * _lasts(found, k):
+        lasts = farther.durations[k] > 0.5 * times * found.durations[k]
+        if farther.converged and farther.admissible and lasts:
             return farther
     return found
-
-
-def _lasts(orbit: Orbit, k: int) -> float:
-    return float(orbit.ends[k, 0] - orbit.cycle[k, 0])
 
 
 def meets(end: End, event: Event, settings: Settings, kinds: frozenset[Kind] = TERMINAL) -> bool:

@@ -95,7 +95,7 @@ def _no_longer(
 def _lasts(orbit: Orbit, parameter: str, segment: int) -> bool:
     """Tell whether a segment lasts longer than the errors of all equations let it seem to."""
     error = duration_error(orbit, orbit.model.index_of(parameter), segment)
-    return error is not None and bool(orbit.ends[segment, 0] - orbit.cycle[segment, 0] > error)
+    return error is not None and bool(orbit.durations[segment] > error)
 
 
 def _never_lasts(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:

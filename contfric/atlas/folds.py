@@ -133,7 +133,7 @@ def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -
             point = first_point(moved, settings, direction, 0.0)
             if point is None:
                 continue
-            there = point.orbit(orbit.system, orbit.vector, active)
+            there = point.orbit(orbit, active)
             off = there.mirror_distance > _ODD * distance
             if not there.admissible or off is orbit.system.half:
                 continue
@@ -160,7 +160,7 @@ def _add_crossing(
         _add_one_sided(state, event, orbit, point, reason)
         return
     active = orbit.model.index_of(state.settings.parameter)
-    there = point.orbit(orbit.system, orbit.vector, active)
+    there = point.orbit(orbit, active)
     state.accept(event, reason, whole_branch(there, state.settings))
 
 

@@ -17,7 +17,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
 from contfric.continuation.events import ACCURACY, Bifurcation, End, EndReason
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, NEARER, settings_value
 from contfric.continuation.trace import trace_side
@@ -126,7 +126,7 @@ def _ways(
         if any(_is_along(start, known_way, settings) for known_way in tried):
             continue
         tried.append(start)
-        there = start.orbit(orbit.system, orbit.vector, active)
+        there = start.orbit(orbit, active)
         for point in (start, start.reversed()):
             yield there, _trace(there, point, settings, first_step, progress)
 
@@ -156,17 +156,14 @@ def _leave_beside(
     """
     active = orbit.model.index_of(settings.parameter)
     for distance in _distances(orbit, event):
-        vector = orbit.vector.copy()
-        vector[active] += distance * orbit.period * share
         away = way(distance * orbit.period)
         known = ((away / np.abs(away).max(), share),) if share else ()
-        joints = orbit.joints + away
-        moved = altered(orbit, joints=joints, vector=vector)
+        moved = displaced(orbit, active, away, distance * orbit.period * share)
         for tangent, slope in chain(known, directions(moved, active)):
             point = first_point(moved, settings, tangent, slope)
             if point is None:
                 continue
-            there = point.orbit(orbit.system, orbit.vector, active)
+            there = point.orbit(orbit, active)
             if not _is_beside(there, moved, orbit):
                 continue
             if float(np.sum(away * point.tangent)) < 0.0:

@@ -170,7 +170,7 @@ def _longer(orbit: Orbit, freedom: FloatArray) -> float:
 
     A segment that is as long as before ends at the first zero, which a tangency has before it.
     """
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     grows = np.roll(freedom[:, 0], -1) - freedom[:, 0]
     short = lasts[: len(grows)] < SHORT * time_unit(orbit)
     change = float(np.sum(grows[short])) or -float(np.sum(freedom[:, 0]))

@@ -30,7 +30,7 @@ from contfric.continuation.candidates import Candidate
 from contfric.continuation.doubling_point import solved_at_vertex
 from contfric.continuation.events import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
 from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, null_vector, settings_value
@@ -65,10 +65,9 @@ class _Parabola:
 
     def at(self, distance: float) -> Orbit:
         """Return the orbit at a distance from the vertex."""
-        orbit, vector = self.orbit, self.orbit.vector.copy()
-        vector[orbit.model.index_of(self.settings.parameter)] += distance**2 * self.rise
-        joints = orbit.joints + distance * (self.phi + distance * self.bend)
-        return replace(orbit, joints=joints, vector=vector)
+        active = self.orbit.model.index_of(self.settings.parameter)
+        joints = distance * (self.phi + distance * self.bend)
+        return displaced(self.orbit, active, joints, distance**2 * self.rise)
 
     def point(self, distance: float) -> Point:
         """Return the same as a point; multipliers are those next to it."""
@@ -218,7 +217,7 @@ def short_branch(
     test, distance = found
     points = [curve.point(a) for a in (0.0, 0.5 * distance, distance)]
     active = orbit.model.index_of(settings.parameter)
-    here = points[-1].orbit(orbit.system, orbit.vector, active)
+    here = points[-1].orbit(orbit, active)
     kind = kind_of_margin(orbit.system, orbit.system.tests[test], here)
     if kind not in TERMINAL:
         return None

@@ -236,10 +236,9 @@ def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
 
 def differences(one: Diagram, other: Diagram) -> Iterator[str]:
     """Yield what a diagram has and another one has not, in words: events, then branches up to symmetry."""
-    width = one.range[1] - one.range[0]
     for event in one.bifurcations:
         if not any(
-            _same_bifurcation(event, b, one.parameter, width) for b in other.bifurcations
+            _same_bifurcation(event, b, one.parameter, one.width) for b in other.bifurcations
         ) and not any(_is_at(event, node, other) for node in other.events):
             yield f"{event.label} at {one.parameter} = {event.params[one.parameter]:.12g}"
     for branch in one.branches:
@@ -261,7 +260,7 @@ def _is_at(event: Bifurcation, node: Node, diagram: Diagram) -> bool:
     Where a reset is met together with a surface, the motions of the branches that meet there differ by what
     it maps: the node has that of the branch that came first.
     """
-    parameter, width = diagram.parameter, diagram.range[1] - diagram.range[0]
+    parameter, width = diagram.parameter, diagram.width
     value = node.bifurcation.params[parameter]
     if node.bifurcation.kind is not event.kind:
         return False
@@ -292,7 +291,7 @@ def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:
 
     On these no value of the parameter is known to be a value of both; nor are orbits solved on short ones.
     """
-    width = diagram.range[1] - diagram.range[0]
+    width = diagram.width
     if known.mirrored or not all(unresolved(b, width) or is_short(b) for b in (branch, known)):
         return False
     if known.system.half != branch.system.half or identity_of(known) != identity_of(branch):

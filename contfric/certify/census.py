@@ -68,4 +68,4 @@ def certify_census(model: ModelSource, params: Parameters | None = None) -> Cens
         )
     from contfric.certify.census_search import searched
 
-    return searched(model, model.vector({} if params is None else params))
+    return searched(model, model.vector(params))

@@ -22,6 +22,7 @@ from contfric.orbit.holds import Hold, Itinerary
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.system import build_system
 from contfric.signature.holds import hold_at, is_hold
 
@@ -184,7 +185,7 @@ def _multiplier_orbit(event: Bifurcation) -> Orbit:
 def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, list[EventFunction]]:
     """Return an orbit without vanished segments, on its half if it is symmetric; and the tests there."""
     whole, model = orbit.as_whole(), orbit.model
-    lasts = whole.ends[:, 0] - whole.cycle[:, 0]
+    lasts = whole.durations
     kept = [i for i, duration in enumerate(lasts) if duration > _VANISHED]
     itinerary = tuple(whole.itinerary[i] for i in kept)
     joints = whole.cycle[kept]
@@ -270,12 +271,8 @@ def _tangency(orbit: Orbit, test: EventFunction) -> EventPlace:
 
 def _nearest_touch(orbit: Orbit, segment: int, surface: str) -> tuple[float, float]:
     """Return how near a stationary point of an observable comes to its surface, and when."""
-    start = orbit.begins[segment]
-    duration = float(orbit.ends[segment, 0] - orbit.cycle[segment, 0])
     observable = orbit.model.surface_by_name[surface].observable
-    times, values = orbit.flow.stationary(
-        orbit.system.itinerary[segment][0], observable, float(start[0]), start[1:], duration
-    )
+    times, values = stationary_within(orbit, segment, observable)
     gaps = np.abs(values - orbit.flow.level(surface))
     if not len(gaps):
         return float("inf"), 0.0

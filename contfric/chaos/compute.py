@@ -18,7 +18,7 @@ from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.tiles import Place, Tile, TileRows, compute_tile, empty_tile, inside, places
 from contfric.chaos.work import Work
-from contfric.errors import ParameterError, function_of, mapping_of, shown, whole_number
+from contfric.errors import ParameterError, function_of, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
@@ -98,8 +98,7 @@ def lyapunov_map(
     shape = tuple(len(values) for values in grid.values())
     check_size(shape, whole_number("starts", starts, least=1), len(model.states))
     function_of("progress", progress)
-    fixed = mapping_of("params", {} if params is None else params, "{'S0': 0.4}")
-    vector, example = _checked_params(model, grid, fixed)
+    vector, example = _checked_params(model, grid, params)
     count = number_of_starts(model, state, starts, example)
     check_size(shape, count, len(model.states))
     states = None if state is None else _all_states(model, grid, vector, state, count)

@@ -202,7 +202,7 @@ def lyapunov_exponent(
     """
     model, params = tied(model, params)
     limits = limits_of(transient, periods, tolerance, confirm)
-    vector = model.vector({} if params is None else params)
+    vector = model.vector(params)
     named = model.mapping(vector)
     if state is None:
         states = default_states(model, named, 1)

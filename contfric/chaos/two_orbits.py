@@ -98,9 +98,9 @@ def two_orbit_estimate(
     distance = real_number("distance", distance)
     if not 0.0 < distance < 1.0:
         raise ParameterError(f"distance is a number between 0 and 1, got {distance!r}")
-    check_excited(model, model.vector(params or {}))
-    begun = simulate(model, dict(params or {}), state=state, time=time, periods=transient)
-    vector = model.vector(params or {})
+    vector = model.vector(params)
+    check_excited(model, vector)
+    begun = simulate(model, params, state=state, time=time, periods=transient)
     period = model.view(vector).period
     start = time + transient * period
     first = _Rider(model, vector, start, begun.last[2], begun.last[3])

@@ -126,7 +126,7 @@ class Estimate:
         """
         rough = 2.0 * ACCURACY * self.width
         before, here = self.sides[0], self.here
-        lasts = here.ends[:, 0] - here.cycle[:, 0]
+        lasts = here.durations
         length, change = self.point.arc - before.arc, self.point.value - before.value
         none = int(np.sum(lasts < _NO_LENGTH * time_unit(here)))
         if error is None or error < rough or none < 2 or not length > 0.0 or change == 0.0:

@@ -104,7 +104,7 @@ class Arms:
         if point is None:
             return None
         active = fold.model.index_of(settings.parameter)
-        longer = point.orbit(fold.system, fold.vector, active)
+        longer = point.orbit(fold, active)
         guess = replace(longer, joints=2.0 * fold.joints - longer.joints)
         shorter = refine(replace(guess, residual=np.inf), damped=False)
         if not (longer.converged and shorter.converged):

@@ -183,4 +183,4 @@ def vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
 
 
 def _lasts(orbit: Orbit, i: int) -> bool:
-    return bool(orbit.ends[i, 0] - orbit.cycle[i, 0] > _NO_LENGTH)
+    return bool(orbit.durations[i] > _NO_LENGTH)

@@ -248,7 +248,7 @@ def crossing_between(
     )
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
-    here = near.orbit(orbit.system, orbit.vector, active)
+    here = near.orbit(orbit, active)
     crossing = crossing_near(here, settings, 2.0 * float(np.sqrt(square)))
     if crossing is None:
         return None

@@ -20,6 +20,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.slides import SHORT
 
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
@@ -61,11 +62,10 @@ def never_leaves(orbit: Orbit) -> bool:
     for own in {model.chatter_by_mode[m] for m, _ in orbit.itinerary if m in model.chatter_by_mode}:
         gap, highest = model.surface_by_name[own.surface].observable, 0.0
         level = orbit.flow.level(own.surface)
-        for (mode, _), begin, end in zip(orbit.itinerary, orbit.begins, orbit.ends, strict=True):
+        for i, ((mode, _), end) in enumerate(zip(orbit.itinerary, orbit.ends, strict=True)):
             if mode in model.chatter_by_mode:
                 continue
-            lasts = float(end[0] - begin[0])
-            _, values = orbit.flow.stationary(mode, gap, float(begin[0]), begin[1:], lasts)
+            _, values = stationary_within(orbit, i, gap)
             highest = max(
                 highest,
                 *np.abs(values - level),
@@ -92,7 +92,7 @@ def equilibrium_met(orbit: Orbit) -> str | None:
         return None
     size = float(np.max(np.ptp(np.vstack([orbit.begins, orbit.ends])[:, 1:], axis=0)))
     for i, (mode, exit_) in enumerate(orbit.itinerary):
-        lasts = float(orbit.ends[i, 0] - orbit.begins[i, 0])
+        lasts = float(orbit.durations[i])
         stands = orbit.model.is_at_rest(mode) or mode in orbit.model.chatter_by_mode
         if stands or lasts < SHORT * orbit.period:
             continue

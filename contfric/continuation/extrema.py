@@ -100,7 +100,7 @@ class _ExtremumSearch:
     def orbit(self, point: Point) -> Orbit:
         """Return a point as an orbit."""
         branch = self.branch
-        return point.orbit(branch.system, branch.vector, branch.model.index_of(branch.parameter))
+        return point.orbit(branch, branch.model.index_of(branch.parameter))
 
     def step(self, before: Point, after: Point) -> _Step:
         """Return a step with what is measured at its ends."""

@@ -71,7 +71,7 @@ def _split_between(
     """
     if not orbit.system.holds:
         return None
-    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
     found = bifurcation_at(Kind.SN, here, before, after, before, settings)
     split = as_split(found, before.tangent + share * (after.tangent - before.tangent))
     if split is None:
@@ -211,7 +211,7 @@ def not_located(
 
     Its bound is that of an event at the point, and as much again for the way after it.
     """
-    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
     bifurcation = bifurcation_at(kind, here, before, beyond, before, settings)
     return altered(bifurcation, located=False, bound=2.0 * bifurcation.accuracy), before
 
@@ -219,7 +219,7 @@ def not_located(
 def _fold(orbit: Orbit, before: Point, after: Point, point: Point, settings: Settings) -> Located:
     """Tell a fold from the vertex of a pitchfork or of a period doubling."""
     active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit.system, orbit.vector, active)
+    here = point.orbit(orbit, active)
     symmetric = symmetric_part(here, active)
     if symmetric is not None:
         kind, here = Kind.BP, symmetric

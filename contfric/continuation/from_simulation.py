@@ -64,7 +64,7 @@ def _inside(orbit: Orbit) -> tuple[int, float]:
 
     Its middle will not do: by symmetry, or after a touch, it may be a stationary point.
     """
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     resting = resting_modes(orbit)
     rests = [mode in resting for mode, _ in orbit.itinerary]
     i = int(np.argmax(np.where(rests, -1.0, lasts)))

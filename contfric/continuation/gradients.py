@@ -31,7 +31,7 @@ def gradient_of(
     i, m = location.segment, orbit.joints.shape[1]
     gradient, slope = np.zeros((count + 1, m)), 0.0
     held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
-    short = held is not None and orbit.ends[i, 0] - orbit.cycle[i, 0] < _SHORT
+    short = held is not None and orbit.durations[i] < _SHORT
     if location.margin is Margin.LASTING or short:
         gradient[i + 1, 0], gradient[i, 0] = 1.0, -1.0
         return gradient, slope

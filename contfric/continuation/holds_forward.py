@@ -43,7 +43,7 @@ def with_holds_forward(
     before : a point of the branch before the located one: its tangent leads to that
     first : the margin that vanishes at the located point
     """
-    lasts = here.ends[:, 0] - here.cycle[:, 0]
+    lasts = here.durations
     most = SHORT * time_unit(here)
     count = here.system.segments
     back = [h.segment for h in here.system.holds if -most < lasts[h.segment] < 0.0]
@@ -60,8 +60,8 @@ def with_holds_forward(
     if solved is None:
         return point, here, first
     moved = float(np.abs(solved.joints - here.joints).max())
-    there = solved.orbit(here.system, here.vector, here.model.index_of(settings.parameter))
-    last = float(np.min(there.ends[:, 0] - there.cycle[:, 0]))
+    there = solved.orbit(here, here.model.index_of(settings.parameter))
+    last = float(np.min(there.durations))
     if moved > _NEAR * float(np.max(-lasts[back])) or last < 0.0 or not there.admissible:
         return point, here, first
     ahead = solved if np.sum(way * solved.tangent) >= 0.0 else solved.reversed()

@@ -140,7 +140,7 @@ def _moves(orbit: Orbit) -> bool:
     Where one mass rests others are free to move, and may rest as well.
     """
     resting = resting_modes(orbit)
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     for (mode, _), begin, last in zip(orbit.itinerary, orbit.begins, lasts, strict=True):
         if mode not in resting and last > SHORT * time_unit(orbit):
             start = float(begin[0]), begin[1:]
@@ -262,7 +262,7 @@ def _vanished(orbit: Orbit) -> Iterator[EventFunction]:
 
     Their margins do not show it: they are of the order of the length, and its square is what is located.
     """
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     for hold in orbit.system.holds:
         touches = hold.pin is None and not hold.after_rest
         if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH * time_unit(orbit):

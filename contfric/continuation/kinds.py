@@ -102,7 +102,7 @@ def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:
         return None
     before, behind = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
-    vanished = bool(orbit.ends[k, 0] - orbit.begins[k][0] < _VANISHED)
+    vanished = bool(orbit.durations[k] < _VANISHED)
     return (k - 1) % len(itinerary) if same and vanished else None
 
 
@@ -119,7 +119,7 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
             return hold
         behind = (hold.segment + 1) % len(orbit.system.itinerary)
         if test.segment == behind and test.margin is not Margin.JOINT:
-            duration = orbit.ends[behind, 0] - orbit.cycle[behind, 0]
+            duration = orbit.durations[behind]
             if duration < _VANISHED:
                 return hold
     return None

@@ -60,7 +60,7 @@ def last_told(
     Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event it
     is infinite, or its sign is that of a rate that is rounding.
     """
-    here = beyond.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = beyond.orbit(orbit, orbit.model.index_of(settings.parameter))
     if beyond is not after and _comes_in(here):
         told = _told_before(orbit, before, beyond, settings)
         if told is not None:
@@ -81,13 +81,12 @@ def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) ->
     pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
     if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
         return before
-    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-    return _if_finite(point_before(here, before, -SAME_LOCATION, settings)) or before
+    return _if_finite(point_before(orbit, before, -SAME_LOCATION, settings)) or before
 
 
 def _comes_in(here: Orbit) -> bool:
     """Tell whether a segment has no length at an event."""
-    return bool(np.min(here.ends[:, 0] - here.cycle[:, 0]) < NO_LENGTH)
+    return bool(np.min(here.durations) < NO_LENGTH)
 
 
 def _if_finite(point: Point | None) -> Point | None:

@@ -90,7 +90,7 @@ def _between(branch: Branch, k: int, share: float, active: int, settings: Settin
     guess = Orbit(branch.system, branch.joints[k] + share * chord, vector, 0.0)
     size = float(np.sqrt(np.sum(chord**2) / len(chord) + slope**2 * settings.scale))
     point = first_point(guess, settings, chord / size, slope / size)
-    return None if point is None else point.orbit(branch.system, branch.vector, active)
+    return None if point is None else point.orbit(branch, active)
 
 
 def _belongs_to_another(branch: Branch, event: Bifurcation, width: float) -> bool:

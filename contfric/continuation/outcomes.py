@@ -271,7 +271,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     after_rest = ends_rest(orbit.model, *itinerary[before])
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
-    if orbit.ends[h, 0] - orbit.cycle[h, 0] < no_length * time_unit(orbit):
+    if orbit.durations[h] < no_length * time_unit(orbit):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
             return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
@@ -283,7 +283,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
         return _never_left(orbit, h, after_rest)
     if location.margin is Margin.INTERIOR:
         return _pin_moves(orbit, location, after_rest)
-    gone = orbit.ends[behind, 0] - orbit.cycle[behind, 0] < NEARLY_NO_LENGTH * time_unit(orbit)
+    gone = orbit.durations[behind] < NEARLY_NO_LENGTH * time_unit(orbit)
     # a second hold, and the slide between them
     if gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
         return _never_left(orbit, h, after_rest)

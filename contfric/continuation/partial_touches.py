@@ -105,7 +105,7 @@ def _candidate(orbit: Orbit, kept: tuple[int, ...], reason: str, way: Leaving | 
 
 def _passages(whole: Orbit) -> list[int]:
     """Return the segments of no length beyond a surface that is crossed there and back."""
-    lasts, n, model = whole.ends[:, 0] - whole.begins[:, 0], len(whole.itinerary), whole.model
+    lasts, n, model = whole.durations, len(whole.itinerary), whole.model
     found = []
     for k, (_, surface) in enumerate(whole.itinerary):
         before, behind = whole.itinerary[k - 1], whole.itinerary[(k + 1) % n]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.attributes import altered
 from contfric.errors import (
     ParameterError,
     checked_range,
@@ -25,6 +26,7 @@ from contfric.orbit.system import IntArray, System
 from contfric.quantities.registry import number_quantity
 
 if TYPE_CHECKING:
+    from contfric.continuation.branch import Branch
     from contfric.continuation.geometry import Points
 
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
@@ -139,17 +141,22 @@ class Point:
         """The rate of the parameter of a branch."""
         return float(self.direction[0])
 
-    def orbit(self, system: System, vector: FloatArray, active: int) -> Orbit:
-        """Return the point of a branch as an orbit; the same one for the same question."""
-        asked, own = (system, vector, active, self.joints, self.w), vars(self)
+    def orbit(self, of: Orbit | Branch, active: int) -> Orbit:
+        """Return the point of the branch through an orbit as an orbit; the same one for the same question."""
+        asked, own = (of.system, of.vector, active, self.joints, self.w), vars(self)
         last: tuple[tuple[object, ...], Orbit] | None = own.get("_orbit")
         if last is not None and all(map(operator.is_, asked, last[0])):
             return last[1]
-        full = vector.copy()
+        full = of.vector.copy()
         full[active] = self.w[0]
-        found = Orbit(system, self.joints.copy(), full, 0.0)
+        found = Orbit(of.system, self.joints.copy(), full, 0.0)
         own["_orbit"] = asked, found
         return found
+
+    def along(self, of: Orbit | Branch, active: int, distance: float) -> Orbit:
+        """Return the orbit at a distance along the tangent, not solved."""
+        here = self.orbit(of, active)
+        return displaced(here, active, distance * self.tangent, distance * self.slope)
 
     def as_start(self) -> tuple[FloatArray, FloatArray]:
         """Return (joints, tangent) and (parameters, direction) as the march takes them."""
@@ -283,6 +290,13 @@ class PointRows:
         self.tangents[k], self.directions[k] = point.tangent, point.direction
         self.tests[k], self.labels[k] = point.tests, point.labels
         self.mu[k], self.arc[k] = point.mu, point.arc
+
+
+def displaced(orbit: Orbit, active: int, joints: FloatArray, rise: float) -> Orbit:
+    """Return an orbit, not solved, of which the joints and one parameter have moved by this much."""
+    vector = orbit.vector.copy()
+    vector[active] += rise
+    return altered(orbit, joints=orbit.joints + joints, vector=vector)
 
 
 def next_to(orbit: Orbit, settings: Settings, share: float) -> Orbit | None:

@@ -52,7 +52,7 @@ def move_joints(orbit: Orbit, side: Side, settings: Settings) -> bool:
     ]
     if not at:
         return False
-    other = moved(tip.orbit(system, orbit.vector, orbit.model.index_of(settings.parameter)))
+    other = moved(tip.orbit(orbit, orbit.model.index_of(settings.parameter)))
     point = None if other is None else first_point(other, settings)
     if point is None or not np.min(point.tests[at]) > _FASTER * np.min(tip.tests[at]):
         return False

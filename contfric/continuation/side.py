@@ -302,10 +302,8 @@ def first_point(
     return None if why == BROKEN else rows.only()
 
 
-def point_before(here: Orbit, point: Point, back: float, settings: Settings) -> Point | None:
-    """Solve for the point of a branch this far (in arclength) before one; ``here`` is the orbit at that."""
-    vector = here.vector.copy()
-    vector[here.model.index_of(settings.parameter)] -= back * point.slope
-    moved = altered(here, joints=here.joints - back * point.tangent, vector=vector)
+def point_before(orbit: Orbit, point: Point, back: float, settings: Settings) -> Point | None:
+    """Solve for the point of a branch this far (in arclength) before one."""
+    moved = point.along(orbit, orbit.model.index_of(settings.parameter), -back)
     found = first_point(moved, settings, point.tangent, point.slope)
     return None if found is None else altered(found, arc=point.arc - back)

@@ -129,12 +129,12 @@ def _pulled_in(
     margin that was zero to either side of it.
     """
     active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit.system, orbit.vector, active)
+    here = point.orbit(orbit, active)
     if point.lost or _is_inside(here):
         return point, here
     for back in _BACK:
         nearer = point_before(here, point, back, settings)
-        there = None if nearer is None else nearer.orbit(orbit.system, orbit.vector, active)
+        there = None if nearer is None else nearer.orbit(orbit, active)
         if nearer is not None and there is not None and _is_inside(there):
             return nearer, there
     return point, here
@@ -142,7 +142,7 @@ def _pulled_in(
 
 def _is_inside(here: Orbit) -> bool:
     """Tell whether no margin is negative, and no segment lasts less than nothing."""
-    lasts = here.ends[:, 0] - here.cycle[:, 0]
+    lasts = here.durations
     return bool(lasts.min() >= 0.0 and here.margins.min(initial=0.0) > -_NEGATIVE)
 
 
@@ -164,10 +164,7 @@ def _stop_after(here: Orbit, point: Point, first: int) -> int:
     if test.margin is not Margin.EXIT or hold_of_test(test, here) is not None:
         return first
     i = test.segment
-    if (
-        ends_rest(here.model, *here.itinerary[i])
-        or here.ends[i, 0] - here.cycle[i, 0] > _VANISHED * here.period
-    ):
+    if ends_rest(here.model, *here.itinerary[i]) or here.durations[i] > _VANISHED * here.period:
         return first
     return _stop_before(here, point, i, first)
 
@@ -228,7 +225,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     # a hold ends at a load, as rest does: nothing slides up to it
     if limit != first or not here.model.filippov or is_hold(here.itinerary[i][1]):
         return limit
-    if here.ends[i, 0] - here.cycle[i, 0] <= _VANISHED * here.period:
+    if here.durations[i] <= _VANISHED * here.period:
         return first
     for k, other in enumerate(tests):
         tangential = other.margin is Margin.EXIT and abs(point.tests[k]) < _NEARLY_REACHED
@@ -308,7 +305,7 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     The ends of two holds are singular each (a hold without acceleration moves nothing), and together
     they stop Newton at the root of rounding; as does a stick that vanishes at a tangential release.
     """
-    here = tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = tip.orbit(orbit, orbit.model.index_of(settings.parameter))
     near = [
         test
         for test, value in zip(orbit.system.tests, tip.tests, strict=False)

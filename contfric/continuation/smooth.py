@@ -110,7 +110,7 @@ def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> 
     left = float(fold.orbit.margins.min(initial=np.inf))
     if fold.kind is not Kind.SN or not (fold.located and left < _OUTSIDE):
         return False
-    here = before.orbit(orbit.system, orbit.vector, active)
+    here = before.orbit(orbit, active)
     return left < _FALLEN * float(here.margins.min(initial=np.inf))
 
 
@@ -138,9 +138,7 @@ def _change_next_to(
     orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
 ) -> float:
     """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = point.value + shift * point.slope
-    moved = Orbit(orbit.system, point.joints + shift * point.tangent, vector, np.inf)
+    moved = point.along(orbit, orbit.model.index_of(settings.parameter), shift)
     near = first_point(moved, settings, point.tangent, point.slope)
     return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
 
@@ -161,7 +159,7 @@ def _at_multiplier(
     elif column == CHI_MINUS and not orbit.system.half:
         kind = Kind.PD
     active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit.system, orbit.vector, active)
+    here = point.orbit(orbit, active)
     if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
         return []  # the fold there says what it is; near it chi(1) is rounding
     event = bifurcation_at(kind, here, before, beyond, point, settings)
@@ -178,7 +176,7 @@ def _passes_vertex(
         return False
     active = orbit.model.index_of(settings.parameter)
     between = parabola_vertex(before, after, share)
-    return _is_vertex(between.orbit(orbit.system, orbit.vector, active), active)
+    return _is_vertex(between.orbit(orbit, active), active)
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:
@@ -195,7 +193,7 @@ def _overshot(
     """
     if after.arc - before.arc <= SHORTEST_OVERSHOOT:
         return not_located(orbit, kind, before, beyond, settings)
-    here = before.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
     found = bifurcation_at(kind, here, before, beyond, before, settings)
     return found, altered(before, lost=True)
 
@@ -231,7 +229,7 @@ def _changes(
     ):
         found.append(not_located(orbit, Kind.T, before, after, settings))
     for point in locations:
-        here = point.orbit(orbit.system, orbit.vector, active)
+        here = point.orbit(orbit, active)
         if here.margins.min(initial=0.0) < -_OUTSIDE:
             continue  # where curves cross a trial may lie on another one
         test = EventFunction(*_label_location(orbit, k))
@@ -250,6 +248,7 @@ def _undone(
     """
     from contfric.continuation.bracket import BY_PARAMETER
 
+    active = orbit.model.index_of(settings.parameter)
     found: list[Located] = []
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
     for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
@@ -257,7 +256,7 @@ def _undone(
             continue
         sides = [(one, _NEARBY)] * near + [(other, -_NEARBY)] * far
         for point, share in sides:
-            asked = _along(orbit, point, share * (other.arc - one.arc), settings).labels
+            asked = point.along(orbit, active, share * (other.arc - one.arc)).labels
             if not ((before.labels == after.labels) & (asked != before.labels)).any():
                 continue
             value = point.value + share * (other.value - one.value)
@@ -274,14 +273,6 @@ def _undone(
     return found
 
 
-def _along(orbit: Orbit, point: Point, distance: float, settings: Settings) -> Orbit:
-    """Return the orbit at a distance along the tangent of a point, not solved."""
-    here = point.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
-    vector = here.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] += distance * point.slope
-    return altered(here, joints=here.joints + distance * point.tangent, vector=vector)
-
-
 def _apart(one: Located, other: Located) -> bool:
     """Tell whether two changes of labels are at two locations."""
     return one[0].located and abs(one[1].arc - other[1].arc) > SAME_TANGENCY
@@ -291,7 +282,7 @@ def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) ->
     """Tell whether the segment of a label, or one next to it, has no length at one of two points."""
     i, n = int(orbit.system.layout.labels[k][0]), orbit.system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
-    motions = (point.orbit(orbit.system, orbit.vector, active) for point in points)
+    motions = (point.orbit(orbit, active) for point in points)
     return any(np.any((m.ends - m.cycle)[near, 0] < NO_LENGTH) for m in motions)
 
 
@@ -301,7 +292,7 @@ def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
     At an event it does, and where that is known to the root of rounding what the segment crosses is, too.
     """
     i, c, came, goes = (int(number) for number in orbit.system.layout.labels[k][:4])
-    model, here = orbit.model, point.orbit(orbit.system, orbit.vector, active)
+    model, here = orbit.model, point.orbit(orbit, active)
     observable = model.observables[c].name
     for joint, own in ((here.begins[i], came), (here.ends[i], goes)):
         value = here.flow.observe(observable, float(joint[0]), joint[1:])

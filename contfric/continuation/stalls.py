@@ -27,7 +27,7 @@ def stalled_at(orbit: Orbit, tip: Point, settings: Settings) -> tuple[str, Bifur
     tip : the last point
     """
     active = orbit.model.index_of(settings.parameter)
-    here = tip.orbit(orbit.system, orbit.vector, active)
+    here = tip.orbit(orbit, active)
     crossing = crossing_near(here, settings, _NEAR)
     if crossing is None:
         return _multipliers(here), None

@@ -71,7 +71,7 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     """Tell whether segment ``j`` moves on a surface for no time, between two of one mode; nothing jumps."""
     itinerary = orbit.itinerary
     j %= len(itinerary)
-    lasts = orbit.ends[j, 0] - orbit.cycle[j, 0]
+    lasts = orbit.durations[j]
     before, behind = itinerary[j - 1][0], itinerary[(j + 1) % len(itinerary)][0]
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
     return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))

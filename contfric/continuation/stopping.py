@@ -76,7 +76,7 @@ class _Sought:
 
     def _orbit(self, point: Point) -> Orbit:
         active = self.orbit.model.index_of(self.settings.parameter)
-        found = point.orbit(self.orbit.system, self.orbit.vector, active)
+        found = point.orbit(self.orbit, active)
         return found.mirror() if self.mirrored else found
 
     def crossing(self, before: Point, after: Point) -> Stop | None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.continuation.crossing import Direction
-from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.points import EXTRA, Point, Settings, displaced
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import assembled
@@ -58,11 +58,9 @@ def null_vector(orbit: Orbit) -> FloatArray:
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 
 
-def leave_branch_point(
-    orbit: Orbit, settings: Settings, reason: str, distance: float = LEAVE
-) -> BranchStart | None:
-    """Return a start on the branch that leaves a singular orbit along its null vector."""
-    return leave_along(orbit, settings, Direction(null_vector(orbit), 0.0), reason, distance)
+def null_direction(orbit: Orbit) -> Direction:
+    """Return the direction of the null vector of a singular orbit, in which the parameter stands."""
+    return Direction(null_vector(orbit), 0.0)
 
 
 @foreseeable()
@@ -71,10 +69,8 @@ def leave_along(
 ) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
     origin = first_point(orbit, settings)
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] += distance * direction.slope
-    joints = orbit.joints + distance * direction.joints
-    moved = replace(orbit, joints=joints, vector=vector)
+    active = orbit.model.index_of(settings.parameter)
+    moved = displaced(orbit, active, distance * direction.joints, distance * direction.slope)
     point = first_point(moved, settings, direction.joints, direction.slope)
     if point is None:
         return None
@@ -94,7 +90,7 @@ def overshoots(
     settings: Settings,
     departure: BranchStart,
     distance: float,
-    direction: Direction | None = None,
+    along: Direction,
 ) -> bool:
     """Tell whether a start lies behind something that belongs to the branch, too.
 
@@ -103,7 +99,6 @@ def overshoots(
     """
     from contfric.continuation.steps import CHI_MINUS
 
-    along = direction or Direction(null_vector(orbit), 0.0)
     nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
     if nearer is None:
         return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at

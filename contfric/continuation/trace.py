@@ -270,4 +270,4 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 
 def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:
     """Return the last orbit of a side."""
-    return side.tip.orbit(orbit.system, orbit.vector, orbit.model.index_of(settings.parameter))
+    return side.tip.orbit(orbit, orbit.model.index_of(settings.parameter))

@@ -56,9 +56,7 @@ def nearer_than_twins(
         if not np.all(rates < 0.0) or float(np.max(lasts)) < _REACHED * time_unit(orbit):
             break
         step = share * float(np.min(lasts / -rates))
-        vector = orbit.vector.copy()
-        vector[active] = tip.value + step * tip.slope
-        moved = Orbit(orbit.system, tip.joints + step * tip.tangent, vector, np.inf)
+        moved = tip.along(orbit, active, step)
         there = first_point(moved, settings, tip.tangent, tip.slope)
         if there is None or not _stays(orbit, there, twins, float(np.max(lasts))):
             share *= 0.5

@@ -134,7 +134,7 @@ def unit_of(orbit: Orbit) -> Unit:
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     longest = max(slides, key=lambda i: lasts[i])
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.itinerary[longest][0]
@@ -197,7 +197,7 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
         gaps[:, :, 0] = 0.0
     else:
         gaps[:, :, 0] -= period * np.rint(gaps[:, :, 0] / period)
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     fits = (np.abs(gaps).max(axis=2) < SAME_SOLUTION) & (lasts > SAME_SOLUTION * time_unit(orbit))
     itinerary, wanted = orbit.itinerary, [whole(unit.mode)]
     if unit.half:

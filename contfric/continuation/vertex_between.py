@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.doubling_point import moved, opening
-from contfric.continuation.points import Point, Settings
+from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.side import first_point
 from contfric.continuation.vertices import joints_like, symmetrised, undoubled
 from contfric.orbit.orbit import Orbit
@@ -60,7 +60,7 @@ def _at_values(before: Point, after: Orbit, active: int) -> Orbit | None:
 
 def _along_chord(before: Point, after: Orbit, settings: Settings, active: int) -> Orbit | None:
     """Return the vertex between two orbits, the orbits between being normal to their chord."""
-    low = _simpler(before.orbit(after.system, after.vector, active))
+    low = _simpler(before.orbit(after, active))
     high = _simpler(after)
     if low is None or high is None or low.joints.shape != high.joints.shape:
         return None
@@ -72,11 +72,9 @@ def _along_chord(before: Point, after: Orbit, settings: Settings, active: int) -
     plain = replace(settings, stability=False)
 
     def between(share: float, _: Orbit | None) -> Orbit | None:
-        vector = low.vector.copy()
-        vector[active] += share * rise
-        guess = replace(low, joints=low.joints + share * chord, vector=vector)
+        guess = displaced(low, active, share * chord, share * rise)
         point = first_point(guess, plain, chord / length, rise / length)
-        return None if point is None else point.orbit(low.system, low.vector, active)
+        return None if point is None else point.orbit(low, active)
 
     return _vanishing(between)
 

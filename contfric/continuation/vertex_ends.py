@@ -80,7 +80,7 @@ def _gone_unseen(
     active = model.index_of(settings.parameter)
 
     def repeats(row: int) -> bool:
-        there = side.rows.point(row).orbit(system, orbit.vector, active)
+        there = side.rows.point(row).orbit(orbit, active)
         return shortest(there) is not there
 
     low, high = first, side.last
@@ -97,7 +97,7 @@ def _gone_over(
 ) -> tuple[Bifurcation, Point] | None:
     """Return the vertex at which a step has gone over to the simpler orbits, if it is found."""
     active = orbit.model.index_of(settings.parameter)
-    near = left_at(before, after.orbit(orbit.system, orbit.vector, active), settings)
+    near = left_at(before, after.orbit(orbit, active), settings)
     vertex = None if near is None else vertex_at(orbit, near, settings)
     return None if near is None or vertex is None else (vertex, near)
 

@@ -89,7 +89,7 @@ def simpler_fold(orbit: Orbit, settings: Settings) -> Orbit | None:
             return shorter
         point = first_point(part, settings, null[0], 0.0) if len(null) == 1 else None
         if point is not None and np.abs(point.joints - part.joints).max() < _ODD:
-            return point.orbit(part.system, part.vector, part.model.index_of(settings.parameter))
+            return point.orbit(part, part.model.index_of(settings.parameter))
     return None
 
 

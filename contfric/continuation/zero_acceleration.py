@@ -14,6 +14,7 @@ import numpy as np
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import state_within, stationary_within
 from contfric.orbit.system import inside_sign, mode_domains
 from contfric.signature.holds import is_hold, left_surface
 
@@ -103,21 +104,13 @@ def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> fl
 
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
     """Return the joint (t, y) of a segment of the whole orbit at a time inside it."""
-    start = orbit.begins[i]
-    begin = float(start[0])
-    return np.array(
-        [time, *orbit.flow.state(orbit.itinerary[i][0], begin, start[1:], time - begin)]
-    )
+    return np.array([time, *state_within(orbit, i, time - float(orbit.begins[i, 0]))])
 
 
 def stationary_values(orbit: Orbit, i: int, observable: str) -> list[tuple[float, float]]:
     """Return times and values of the stationary points of an observable along a segment."""
-    start = orbit.begins[i]
-    begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
-    times, values = orbit.flow.stationary(
-        orbit.itinerary[i][0], observable, begin, start[1:], lasts
-    )
-    return [(begin + float(t), float(v)) for t, v in zip(times, values, strict=True)]
+    begin, found = float(orbit.begins[i, 0]), stationary_within(orbit, i, observable)
+    return [(begin + float(t), float(v)) for t, v in zip(*found, strict=True)]
 
 
 def _stationary(orbit: Orbit, i: int) -> list[float]:

@@ -53,7 +53,7 @@ _SECANTS = 6
 _FOUND = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ExtremumCurve(QuantityCurve):
     """Orbits at which a quantity is stationary in all parameters that vary but the last one.
 
@@ -79,10 +79,6 @@ class ExtremumCurve(QuantityCurve):
     def label(self) -> str:
         """What is extreme, for a legend."""
         return f"{self.quantity} extreme in {', '.join(self.parameters[:-1])}"
-
-    def __repr__(self) -> str:
-        ends = " and ".join(end.reason.name for end in self.ends)
-        return f"<ExtremumCurve, {self.label}: {len(self)} points, ends {ends}>"
 
 
 @dataclass

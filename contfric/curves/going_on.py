@@ -25,6 +25,7 @@ from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.sections import canonical, moved
 from contfric.orbit.system import EventFunction, IntArray, Margin
 from contfric.remember.journal import remembered
@@ -73,15 +74,11 @@ def _tangent_at(orbit: Orbit, test: EventFunction) -> EventFunction:
 def _touch_time(orbit: Orbit, test: EventFunction) -> float:
     """Return the time at which an observable is stationary nearest to a surface inside a segment."""
     i, observable = test.segment, orbit.model.surface_by_name[test.surface].observable
-    start = orbit.begins[i]
-    begin, lasts = float(start[0]), float(orbit.ends[i, 0] - start[0])
-    times, values = orbit.flow.stationary(
-        orbit.itinerary[i][0], observable, begin, start[1:], lasts
-    )
+    times, values = stationary_within(orbit, i, observable)
     if len(times) == 0:
         return float("nan")
     level = orbit.flow.level(test.surface)
-    return float(begin + times[int(np.argmin(np.abs(values - level)))])
+    return float(float(orbit.begins[i, 0]) + times[int(np.argmin(np.abs(values - level)))])
 
 
 def same_location(one: Orbit, a: EventFunction, other: Orbit, b: EventFunction) -> bool:
@@ -212,7 +209,7 @@ def prove(
         free, still = pinned[~held], np.sort(pinned[held])
         others = np.ones(len(margins), dtype=np.bool_)
         others[still] = False
-        lasts = bool(np.all(orbit.ends[:, 0] - orbit.cycle[:, 0] > -_NO_TIME))
+        lasts = bool(np.all(orbit.durations > -_NO_TIME))
         if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
             continue
         if not born and is_continuum(problem, start) and is_continuum(problem, beside):

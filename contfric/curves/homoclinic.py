@@ -21,7 +21,7 @@ from contfric.curves.trace import Progress
 from contfric.errors import ParameterError, real_number
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HomoclinicCurve(QuantityCurve):
     """Orbits of one long period near a homoclinic end, in the plane of two parameters.
 
@@ -39,10 +39,6 @@ class HomoclinicCurve(QuantityCurve):
     def label(self) -> str:
         """Name with the bound on the period, such as ``HOM (period 12)``."""
         return f"HOM (period {self.value:g})"
-
-    def __repr__(self) -> str:
-        ends = " and ".join(end.reason.name for end in self.ends)
-        return f"<HomoclinicCurve {self.label}: {len(self)} points, ends {ends}>"
 
 
 def continue_homoclinic(

@@ -189,8 +189,7 @@ def _tangential_release(special: SpecialPoint, problem: Problem, largest: float)
     sticks = [
         i
         for i, (mode, _) in enumerate(edited.system.itinerary)
-        if edited.model.mode_by_name[mode].sliding
-        and abs(edited.ends[i, 0] - edited.cycle[i, 0]) < _VANISHES
+        if edited.model.mode_by_name[mode].sliding and abs(edited.durations[i]) < _VANISHES
     ]
     for i in sticks:
         test = EventFunction(Margin.EXIT, i, edited.system.itinerary[i][1])

@@ -16,6 +16,7 @@ from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.system import EventFunction, IntArray, Margin, System
 
 if TYPE_CHECKING:
@@ -121,10 +122,7 @@ def check_start(bifurcation: Bifurcation, box: PlaneRanges) -> None:
         raise ParameterError(
             f"{bifurcation!r} lies on a bridge: curves of orbits with holds are not"
         )
-    here = np.array([orbit.params[name] for name in box.names])
-    if not box.contains(here):
-        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
-        raise ParameterError(f"{kind.value} is at {where}, outside of the ranges")
+    box.check_holds(kind.value, orbit.params)
 
 
 def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
@@ -246,8 +244,7 @@ def tangency(orbit: Orbit, test: EventFunction) -> tuple[int, int, str]:
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]
     start, end = orbit.begins[segment], orbit.ends[segment]
-    mode, duration = orbit.itinerary[segment][0], float(end[0] - start[0])
-    _, values = orbit.flow.stationary(mode, test.surface, float(start[0]), start[1:], duration)
+    _, values = stationary_within(orbit, segment, test.surface)
     reached: list[tuple[float, int, str]] = []
     entry, exit_ = orbit.itinerary[segment - 1][1], orbit.itinerary[segment][1]
     ends = {START: (start, entry), JOINT: (end, exit_)}

@@ -122,4 +122,4 @@ class QuantityCurve(Tabled):
 
     def __repr__(self) -> str:
         ends = " and ".join(end.reason.name for end in self.ends)
-        return f"<QuantityCurve {self.quantity} = {self.value:g}: {len(self)} points, ends {ends}>"
+        return f"<{type(self).__name__} {self.label}: {len(self)} points, ends {ends}>"

@@ -169,10 +169,7 @@ def check_orbit(orbit: Orbit, box: Ranges) -> None:
     """
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    here = np.array([orbit.params[name] for name in box.names])
-    if not box.contains(here):
-        where = ", ".join(f"{n} = {v:.6g}" for n, v in zip(box.names, here, strict=True))
-        raise ParameterError(f"the orbit is at {where}, outside of the ranges")
+    box.check_holds("the orbit", orbit.params)
 
 
 def _start(
@@ -242,11 +239,9 @@ class HeldSide:
 
     def _say(self) -> None:
         """Say how far it is, if anybody listens."""
-        if self.progress is None:
-            return
-        pairs = zip(self.held.box.names, self.points[-1].w, strict=True)
-        where = ", ".join(f"{name} = {value:.6g}" for name, value in pairs)
-        self.progress(f"{self.held.title}: {len(self.points)} points, {where}")
+        if self.progress is not None:
+            where = self.held.box.text(self.points[-1].w)
+            self.progress(f"{self.held.title}: {len(self.points)} points, {where}")
 
     def _returned(self) -> bool:
         """Tell whether the last step has passed the start again, in its direction.

@@ -11,6 +11,9 @@ import numpy as np
 from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
 from contfric.models.definition import FloatArray, Model
 
+#: A start on the edge of a range lies within it: it may be off by rounding, as a share of the width.
+_SLACK = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Ranges:
@@ -42,10 +45,21 @@ class Ranges:
             ]
         return np.array(rows)
 
-    def contains(self, w: FloatArray, slack: float = 1e-9) -> bool:
-        """Tell whether a point lies in the box."""
-        margin = slack * self.widths
-        return bool(np.all(w >= self.low - margin) and np.all(w <= self.high + margin))
+    def text(self, w: FloatArray) -> str:
+        """Return a point in words."""
+        return ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.names, w, strict=True))
+
+    def check_holds(self, what: str, params: Mapping[str, float]) -> None:
+        """Refuse what lies outside of the ranges.
+
+        Raises
+        ------
+        ParameterError
+            If it does.
+        """
+        w, margin = np.array([params[name] for name in self.names]), _SLACK * self.widths
+        if np.any(w < self.low - margin) or np.any(w > self.high + margin):
+            raise ParameterError(f"{what} is at {self.text(w)}, outside of the ranges")
 
 
 @dataclass(frozen=True, eq=False)

@@ -245,9 +245,7 @@ def _trace_piece(
             side.end = CurveEnd(CurveEndReason.INTERRUPTED)
             return side
         if progress is not None:
-            where = ", ".join(
-                f"{n} = {v:.6g}" for n, v in zip(problem.box.names, side.tip.w, strict=True)
-            )
+            where = problem.box.text(side.tip.w)
             progress(f"{problem.kind.value}: {len(side.points)} points, {where}")
         if finished:
             return side

@@ -24,7 +24,6 @@ from contfric.errors import (
     ParameterError,
     checked_range,
     function_of,
-    mapping_of,
     real_number,
     truth,
     whole_number,
@@ -125,7 +124,7 @@ def ensemble(
             "an ensemble of a model takes parameter, range and distributions: ensemble(model, 'Omega', "
             "(0.4, 0.6), {'S': (0.3, 0.34)}); one of a study takes ensemble('study.yaml', samples)"
         )
-    model, params = tied(cast(ModelSource, model), params)
+    model, fixed = tied(cast(ModelSource, model), params)
     check_executor(executor)
     function_of("progress", progress)
     model.index_of(parameter)
@@ -138,7 +137,7 @@ def ensemble(
     limits = {"max_periods": max_periods, "copies": copies}
     limits |= {"max_branches": max_branches, "max_points": max_points}
     options = _options(bridges, limits, max_step)
-    vector = _vector(model, params, parameter, bounds, varied)
+    vector = _vector(model, fixed, parameter, bounds, varied)
     drawn = varied.draw(whole_number("seed", seed, least=0), count)
     vectors = np.tile(vector, (count, 1))
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
@@ -175,17 +174,16 @@ def _values(parameter: str, bounds: tuple[float, float], given: Any) -> FloatArr
 
 def _vector(
     model: Model,
-    params: Parameters | None,
+    params: Mapping[str, float],
     parameter: str,
     bounds: tuple[float, float],
     varied: Varied,
 ) -> FloatArray:
     """Return the parameters, those that vary at their medians."""
-    fixed = dict(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    fixed = {parameter: 0.5 * (bounds[0] + bounds[1]), **params}
     for name in varied.names:
-        if name in fixed:
+        if name in params:
             raise ParameterError(f"'{name}' has a value in params, and a distribution: give one")
-    fixed.setdefault(parameter, 0.5 * (bounds[0] + bounds[1]))
     half = np.array([0.5])
     medians = (float(x.ppf(half)[0]) for x in varied.distributions)
     vector = model.vector({**fixed, **dict(zip(varied.names, medians, strict=True))})

@@ -44,7 +44,7 @@ def events_of(diagram: Diagram) -> tuple[list[str], list[float]]:
         names = sorted({called[k] for k in node.branches})
         label = f"{node.bifurcation.kind.value} {' + '.join(names)}"
         found.append((node.bifurcation.params[diagram.parameter], label))
-    near = _AT_ONCE * (diagram.range[1] - diagram.range[0])
+    near = _AT_ONCE * diagram.width
     first = 0
     for k in range(1, len(found) + 1):
         if k == len(found) or found[k][0] - found[k - 1][0] > near:

@@ -155,7 +155,7 @@ def explore_equilibria(
     low, high = checked_range(parameter, bounds)
     values = whole_number("values", values, least=1)
     function_of("progress", progress)
-    given = {**model.check_params(params or {})}
+    given = model.check_params(params)
     least, most, _, _ = model.limits(parameter, given)
     edges = np.linspace(max(low, least), min(high, most), values + 2)[1:-1]
     options: dict[str, Any] = {"max_step": max_step, "max_points": max_points}

@@ -62,7 +62,7 @@ def find_equilibria(
     """
     model, params = tied(model, params)
     starts, seed = whole_number("starts", starts, least=1), whole_number("seed", seed, least=0)
-    checked = model.check_params({} if params is None else params)
+    checked = model.check_params(params)
     regions = regions_of(model)
     check_no_excitation(model, checked)
     vector = model.vector(checked)

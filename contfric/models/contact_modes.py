@@ -23,7 +23,7 @@ from contfric.models.contact_ranges import constraints_of
 from contfric.models.contact_surfaces import ContactSurfaces
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.description import STRUCTURE
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError, Part, constraints_in, mapping_in
 from contfric.models.grammar import FLOATS, TIME, Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
@@ -116,7 +116,7 @@ class Combinations:
         }
         found |= {"units": self._units(stretches)} if "units" in kept else {}
         if ranges := dict(constraints_of(self.contacts, defaults_of(self.top))):
-            found["constraints"] = ranges | _with_meanings(kept.get("constraints"))
+            found["constraints"] = ranges | constraints_in(kept)
         resets = resets_of(self.structure)
         found |= {"resets": resets} if resets else {}
         if "symmetry" not in kept and self._is_symmetric():
@@ -288,10 +288,3 @@ class Combinations:
             if i != pivot
         ]
         field[self.velocities[pivot]] = summed([*parts, times(repr(1.0 / by), drift(c))])
-
-
-def _with_meanings(given: Any) -> dict[str, str]:
-    """Return constraints as they are declared, as a list or with their meanings, with meanings."""
-    if isinstance(given, Mapping):
-        return {str(text): str(why or "") for text, why in given.items()}
-    return {str(text): "" for text in given or ()}

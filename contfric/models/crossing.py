@@ -41,7 +41,7 @@ from typing import Any
 import sympy
 
 from contfric.models.description import Description, ModeText
-from contfric.models.entries import EntryError
+from contfric.models.entries import EntryError, constraints_in
 from contfric.models.symbols import Formulas
 
 _SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -182,10 +182,7 @@ def crossing_parts(
         key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
     }
     found["departures"] = list(data.get("departures") or [])
-    constraints = data.get("constraints") or {}
-    if not isinstance(constraints, Mapping):
-        constraints = dict.fromkeys(map(str, constraints), "")
-    found["constraints"] = dict(constraints)
+    found["constraints"] = constraints_in(data)
     limits = _Limits(crossing, found)
     a, b = surfaces
     matrix, c = crossing.matrix, crossing.rates

@@ -269,6 +269,11 @@ class Model(Shown, TransitionMaps):
     def _parameter_index(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.parameter_names)}
 
+    def given_params(self, params: object) -> Mapping[str, Any]:
+        """Return the parameters that a user gave, not checked one by one; none if nothing was given."""
+        example = ", ".join(f"'{p.name}': {p.default:g}" for p in self.parameters[:2])
+        return mapping_of("params", {} if params is None else params, f"{{{example}}}")
+
     def check_params(self, params: Mapping[str, Any]) -> dict[str, float]:
         """Return all parameters as floats, defaults filled in.
 
@@ -278,8 +283,7 @@ class Model(Shown, TransitionMaps):
             For an unknown name, a value that is no finite number, or a violated constraint.
         """
         values = self.defaults
-        example = ", ".join(f"'{n}': {v:g}" for n, v in list(values.items())[:2])
-        for name, value in mapping_of("params", params, f"{{{example}}}").items():
+        for name, value in self.given_params(params).items():
             self.index_of(name)
             if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
                 raise ParameterError(

@@ -31,6 +31,12 @@ def mapping_in(data: Mapping[str, Any], key: str) -> dict[str, Any]:
     return {str(k): v for k, v in value.items()} if isinstance(value, Mapping) else {}
 
 
+def constraints_in(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a model's constraints with their meanings, however declared: those of a list have none."""
+    given = data.get("constraints") or {}
+    return dict(given if isinstance(given, Mapping) else dict.fromkeys(map(str, given), ""))
+
+
 def as_identifier(name: str) -> str:
     """Return a name that an observable may have: modes and surfaces may be named F+, observables not.
 

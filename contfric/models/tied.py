@@ -24,13 +24,16 @@ _TIE = "tie"
 _FORMULAS = {"coulomb": "coulomb-yaml"}
 
 
-def tied(model: ModelSource, params: Any = None) -> tuple[Model, Any]:
+def tied(model: ModelSource, params: Any = None) -> tuple[Model, Mapping[str, Any]]:
     """Return a model with the ties that its parameters ask for, and the parameters without these.
+
+    None are an empty mapping: the model has its defaults.
 
     Raises
     ------
     ParameterError
-        If a tie is not an expression of other parameters, or of a model without formulas.
+        If the parameters are no mapping, or a tie is not an expression of other parameters, or of a
+        model without formulas.
 
     Examples
     --------
@@ -41,12 +44,11 @@ def tied(model: ModelSource, params: Any = None) -> tuple[Model, Any]:
     from contfric.models import load_model
 
     found = load_model(model)
-    if not isinstance(params, Mapping):
-        return found, params
-    ties = {name: value for name, value in params.items() if isinstance(value, Mapping)}
+    given = found.given_params(params)
+    ties = {name: value for name, value in given.items() if isinstance(value, Mapping)}
     if not ties:
-        return found, params
-    free = {name: value for name, value in params.items() if name not in ties}
+        return found, given
+    free = {name: value for name, value in given.items() if name not in ties}
     return with_ties(found, {name: _tie(name, value) for name, value in ties.items()}), free
 
 
@@ -109,7 +111,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
         If a tie is not an expression of other parameters.
     """
     from contfric.errors import ModelError
-    from contfric.models.entries import EntryError
+    from contfric.models.entries import EntryError, constraints_in
     from contfric.models.grammar import names_in, parse
 
     given = data.get("parameters")
@@ -133,9 +135,6 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
                 ("parameters", name),
                 f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
             )
-    constraints = data.get("constraints") or {}
-    if not isinstance(constraints, Mapping):
-        constraints = dict.fromkeys(map(str, constraints), "")
     whole: dict[str, Any] = {
         "define": {},
         "observables": {},
@@ -147,7 +146,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
     plain = {
         **whole,
         **{k: v for k, v in data.items() if v is not None},
-        "constraints": constraints,
+        "constraints": constraints_in(data),
     }
     return _substituted(plain, ties)
 

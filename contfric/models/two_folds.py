@@ -137,7 +137,7 @@ def find_two_folds(
     """
     model, params = tied(model, params)
     starts, seed = whole_number("starts", starts, least=1), whole_number("seed", seed, least=0)
-    checked = model.check_params({} if params is None else params)
+    checked = model.check_params(params)
     if not model.definition:
         raise ParameterError(
             f"two-folds of '{model.name}' are found from its formulas, and it is not declared by formulas"

@@ -111,7 +111,7 @@ def find_orbit(
     if longest is not None:
         longest = whole_number("longest", longest, least=1)
     function_of("progress", progress)
-    checked, time = model.check_params({} if params is None else params), real_number("time", time)
+    checked, time = model.check_params(params), real_number("time", time)
     places = Places(model, checked, at)
     begun = places.begin(state)
     return places.put(

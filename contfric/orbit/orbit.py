@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,10 +152,7 @@ class Orbit(MeasuredOrbit):
 
     @cached_property
     def begins(self) -> FloatArray:
-        """Start time and state of each segment of the whole orbit: its joints, after resets.
-
-        Shape (segments, 1 + n).
-        """
+        """Start time and state of each segment of the whole orbit, after resets, shape (segments, 1 + n)."""
         if not self.model.resets:
             return self.cycle
         begins = self.cycle.copy()
@@ -164,6 +161,11 @@ class Orbit(MeasuredOrbit):
             if self.model.reset_at(mode, entry) is not None:
                 begins[i, 1:] = self.flow.reset(entry, float(joint[0]), joint[1:])
         return begins
+
+    @cached_property
+    def durations(self) -> FloatArray:
+        """How long each segment of the whole orbit lasts, shape (segments,)."""
+        return np.asarray(self.ends[:, 0] - self.cycle[:, 0])
 
     def as_whole(self) -> Orbit:
         """Return the same orbit as a problem on its whole cycle."""
@@ -289,9 +291,8 @@ class Orbit(MeasuredOrbit):
     def admissible(self) -> bool:
         """Whether the orbit obeys every inequality inside every segment."""
         margins, _, fine = self._watched
-        lasts = self.ends[:, 0] - self.cycle[:, 0]
-        short = no_time(self.system, self.joints, margins)
-        inside = np.all(margins > margin_slack(self.system, self.joints)) and np.all(lasts > -short)
+        lasts = np.all(self.durations > -no_time(self.system, self.joints, margins))
+        inside = np.all(margins > margin_slack(self.system, self.joints)) and lasts
         return bool(self.converged and fine and inside)
 
     def violations(self) -> list[str]:
@@ -304,10 +305,10 @@ class Orbit(MeasuredOrbit):
             for test, margin, slack in zip(self.system.tests, margins, slacks, strict=True)
             if not margin > slack
         ]
-        lasts = self.ends[:, 0] - self.cycle[:, 0]
-        short = np.flatnonzero(lasts <= -no_time(self.system, self.joints, margins))
+        short = np.flatnonzero(self.durations <= -no_time(self.system, self.joints, margins))
         return found + [
-            f"segment {k + 1} ({self.itinerary[k][0]}): it lasts {lasts[k]:.3g}" for k in short
+            f"segment {k + 1} ({self.itinerary[k][0]}): it lasts {self.durations[k]:.3g}"
+            for k in short
         ]
 
     # ------------------------------------------------------------------ what is seen
@@ -360,9 +361,8 @@ class Orbit(MeasuredOrbit):
     def to_dataframe(self, points: int = 400) -> pd.DataFrame:
         """Return one period as a table: t, the states, the domain (needs pandas)."""
         times, states, names = self.trajectory(points)
-        columns: dict[str, Any] = {"t": times}
-        columns |= {name: states[:, k] for k, name in enumerate(self.model.states)}
-        return as_table({**columns, "domain": names})
+        columns = dict(zip(self.model.states, states.T, strict=True))
+        return as_table({"t": times, **columns, "domain": names})
 
     def certify(self) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).

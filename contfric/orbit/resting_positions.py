@@ -273,7 +273,7 @@ class _Course:
         from contfric.orbit.find import simulated_orbit
 
         model, params = end.orbit.model, end.orbit.params
-        lasts = end.orbit.ends[:, 0] - end.orbit.cycle[:, 0]
+        lasts = end.orbit.durations
         k = int(np.argmax(lasts))  # in the middle of a segment no surface is near
         time = float(end.orbit.cycle[k, 0] + 0.5 * lasts[k])
         state = end.orbit.state(time) + _BEYOND * self.size * self.moving
@@ -307,7 +307,7 @@ def _crossing(old: Orbit, new: Orbit, apart: float) -> tuple[float, str]:
 
 def _heights(orbit: Orbit) -> tuple[FloatArray, list[str]]:
     """Return the margins of an orbit and how long its segments last, and the surface of each."""
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     surfaces = [t.surface for t in orbit.system.tests] + [exit_ for _, exit_ in orbit.itinerary]
     return np.concatenate([orbit.margins, lasts]), surfaces
 

@@ -25,6 +25,13 @@ def state_within(orbit: Orbit, i: int, duration: float) -> FloatArray:
     return orbit.flow.state(orbit.itinerary[i][0], float(start[0]), start[1:], duration)
 
 
+def stationary_within(orbit: Orbit, i: int, observable: str) -> tuple[FloatArray, FloatArray]:
+    """Return durations from the start of a segment to an observable's stationary points, and its values."""
+    start, mode = orbit.begins[i], orbit.itinerary[i][0]
+    lasts = float(orbit.durations[i])
+    return orbit.flow.stationary(mode, observable, float(start[0]), start[1:], lasts)
+
+
 def samples(
     orbit: Orbit, labels: NDArray[np.int64], points: int
 ) -> tuple[FloatArray, FloatArray, list[str]]:

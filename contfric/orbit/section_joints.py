@@ -31,7 +31,7 @@ def divided(whole: Orbit, turns: int) -> Orbit | None:
     None where there is no section, or where it is of no use.
     """
     model = whole.model
-    lasts = whole.ends[:, 0] - whole.cycle[:, 0]
+    lasts = whole.durations
     lasting = {
         model.whole_mode(mode)
         for (mode, _), last in zip(whole.itinerary, lasts, strict=True)

@@ -207,7 +207,7 @@ def simulate(
     ('stick', 'F+')
     """
     model, params = tied(model, params)
-    vector = model.vector({} if params is None else params)
+    vector = model.vector(params)
     y = checked_state(model, vector, state)
     time, periods = real_number("time", time), real_number("periods", periods, least=0.0)
     events = whole_number("events", events, least=1)

@@ -49,7 +49,7 @@ def slides_of(orbit: Orbit) -> list[int]:
     sections slides begin there.
     """
     sliding = resting_modes(orbit)
-    lasts = orbit.ends[:, 0] - orbit.cycle[:, 0]
+    lasts = orbit.durations
     some = [i for i in range(len(orbit.itinerary)) if lasts[i] > SHORT * time_unit(orbit)]
     cut = [i for i in some if orbit.itinerary[i - 1] in orbit.model.sections]
     if cut:  # the only joints that are in every itinerary

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.samples import stationary_within
 from contfric.orbit.system import Itinerary
 
 if TYPE_CHECKING:
@@ -92,13 +93,10 @@ def stationary_points(orbit: Orbit) -> FloatArray:
     x: list[float] = []
     struck: list[bool] = []
     for i, (mode, exit_) in enumerate(orbit.itinerary):
-        start, end = orbit.begins[i], orbit.ends[i]
         values = np.empty(0)
-        if model.displacement and end[0] > start[0]:
-            lasts = float(end[0] - start[0])
-            segment = mode, model.displacement, float(start[0]), start[1:], lasts
-            _, values = orbit.flow.stationary(*segment)
-        x += [*values.tolist(), float(end[1])]
+        if model.displacement and orbit.durations[i] > 0.0:
+            _, values = stationary_within(orbit, i, model.displacement)
+        x += [*values.tolist(), float(orbit.ends[i, 1])]
         struck += [False] * len(values) + [model.reset_at(mode, exit_) is not None]
     size = 1.0 + float(np.max(np.abs(x)))
     return _extrema(np.array(x), np.array(struck), _AT_JOINT * size)

@@ -333,7 +333,7 @@ class OrbitMotion:
                     mode=mode,
                     start=float(orbit.begins[i, 0]),
                     state=np.ascontiguousarray(orbit.begins[i, 1:]),
-                    lasts=float(orbit.ends[i, 0] - orbit.begins[i, 0]),
+                    lasts=float(orbit.durations[i]),
                     d_start=moved[i, 0],
                     d_state=self._d_begin(i),
                     d_lasts=ends[i] - moved[i, 0],

@@ -136,7 +136,7 @@ def basins(
     model, params = tied(model, params)
     check_executor(executor)
     function_of("progress", progress)
-    vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    vector = model.vector(params)
     axes = _checked_grid(model, grid)
     fixed = _checked_at(model, axes, {} if at is None else at)
     periods, tile = whole_number("periods", periods, least=1), whole_number("tile", tile, least=1)

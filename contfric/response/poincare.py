@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from contfric.chaos.running import Progress
 from contfric.errors import (
     function_of,
-    mapping_of,
     real_number,
 )
 from contfric.models import ModelSource, Parameters
@@ -72,7 +71,7 @@ def poincare(
     model, params = tied(model, params)
     section = usual_section(model) if section is None else section
     cut = section_of(model, section, sense)
-    vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    vector = model.vector(params)
     y, begins = checked_state(model, vector, state), real_number("time", time)
     function_of("progress", progress)
     skipped = real_number("transient", transient, least=0.0)

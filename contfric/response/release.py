@@ -15,7 +15,6 @@ from contfric.errors import (
     ParameterError,
     did_you_mean,
     function_of,
-    mapping_of,
     shown,
     whole_number,
 )
@@ -98,7 +97,7 @@ def release_map(
     True
     """
     model, params = tied(model, params)
-    vector = model.vector(mapping_of("params", {} if params is None else params, "{'S0': 0.4}"))
+    vector = model.vector(params)
     check_executor(executor)
     function_of("progress", progress)
     tile = whole_number("tile", tile, least=1)

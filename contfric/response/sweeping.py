@@ -15,7 +15,7 @@ from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.tiles import inside
-from contfric.errors import ParameterError, function_of, mapping_of, real_number, shown
+from contfric.errors import ParameterError, function_of, real_number, shown
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
@@ -139,9 +139,8 @@ def sweep(
         )
     grid = checked_values(model, parameter, values)
     must_fit(f"a sweep of {len(grid)} values", _BYTES * len(grid))
-    fixed = mapping_of("params", {} if params is None else params, "{'S0': 0.4}")
-    defined = _defined(model, parameter, grid, fixed)
-    example = model.check_params({**fixed, parameter: float(grid[defined[0]])})
+    defined = _defined(model, parameter, grid, params)
+    example = model.check_params({**params, parameter: float(grid[defined[0]])})
     vector, starts = model.vector(example), {}
     at = np.tile(vector, (len(defined), 1))
     at[:, model.index_of(parameter)] = grid[defined]

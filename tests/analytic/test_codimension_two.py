@@ -7,7 +7,7 @@ import pytest
 
 import contfric as cf
 from contfric.continuation.points import Settings
-from contfric.continuation.switching import leave_branch_point
+from contfric.continuation.switching import leave_along, null_direction
 from contfric.curves.leaving import leaving
 from contfric.curves.problem import problem_of
 from contfric.curves.ranges import box_of
@@ -53,7 +53,8 @@ def opening(orbit: cf.Orbit) -> float:
     """Which side of a doubling the doubled branch opens to, at constant S."""
     value = orbit.params["Omega"]
     settings = Settings("Omega", value - 0.1, value + 0.1, "", "", 0.2)
-    departure = leave_branch_point(orbit.doubled(), settings, "", 3e-4)
+    doubled = orbit.doubled()
+    departure = leave_along(doubled, settings, null_direction(doubled), "", 3e-4)
     assert departure is not None
     return departure.point.value - value
 

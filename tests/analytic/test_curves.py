@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.switching import leave_branch_point
+from contfric.continuation.switching import leave_along, null_direction
 from contfric.curves.trace import continue_bifurcation
 from contfric.orbit.linear import pencil_of_turn
 from tests.curve_check import miss
@@ -102,7 +102,8 @@ def _opening_side(orbit):
 
     value = orbit.params["Omega"]
     settings = Settings("Omega", value - 0.1, value + 0.1, "", "", 0.2)
-    departure = leave_branch_point(orbit.as_whole(), settings, "")
+    whole = orbit.as_whole()
+    departure = leave_along(whole, settings, null_direction(whole), "")
     return departure.point.value - value
 
 

@@ -19,7 +19,7 @@ from scipy.optimize import brentq, fsolve
 
 import contfric as cf
 from contfric.continuation.points import PointRows, Settings
-from contfric.continuation.switching import leave_branch_point
+from contfric.continuation.switching import leave_along, null_direction
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss
@@ -435,7 +435,8 @@ def test_autonomous_doubling_changes_its_criticality() -> None:
         orbit = found[k]
         value = orbit.params["A"]
         settings = Settings("A", value - 0.1, value + 0.1, "", "", 0.2)
-        departure = leave_branch_point(orbit.doubled(), settings, "", 1e-2)
+        doubled = orbit.doubled()
+        departure = leave_along(doubled, settings, null_direction(doubled), "", 1e-2)
         assert departure is not None
         sides.append(departure.point.value - value)
     assert sides[0] * sides[1] < 0.0

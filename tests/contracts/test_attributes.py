@@ -85,11 +85,11 @@ def test_a_point_is_the_same_orbit_only_for_the_same_question(branch) -> None:
     orbit = branch[3]
     empty = orbit.joints[0]
     point = Point(orbit.joints, orbit.vector[:1], orbit.joints, empty, empty, empty, empty)
-    first = point.orbit(orbit.system, orbit.vector, 0)
-    assert point.orbit(orbit.system, orbit.vector, 0) is first
-    assert point.orbit(orbit.system, orbit.vector.copy(), 0) is not first
+    first = point.orbit(orbit, 0)
+    assert point.orbit(orbit, 0) is first
+    assert point.orbit(replace(orbit, vector=orbit.vector.copy()), 0) is not first
     point.joints = orbit.joints + 1.0
-    moved = point.orbit(orbit.system, orbit.vector, 0)
+    moved = point.orbit(orbit, 0)
     assert (moved.joints == orbit.joints + 1.0).all()
 
 

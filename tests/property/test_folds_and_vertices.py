@@ -19,7 +19,7 @@ from contfric.continuation.doubling_point import moved, opening, refined_opening
 from contfric.continuation.folds import _is_idle
 from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
-from contfric.continuation.switching import LEAVE, leave_branch_point, overshoots
+from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertex_between import left_at
 from contfric.continuation.vertices import passed_vertex
@@ -186,15 +186,16 @@ def test_a_start_behind_a_doubling_leaps() -> None:
     orbit = event.orbit.as_whole()
     settings = settings_of(orbit, "A", (62.0, 75.0), None, True, 5000)
     # what is integrated rounds to 1e-13: next to the vertex Newton's method has to know that
-    start = leave_branch_point(orbit, settings, "BP", LEAVE)
-    assert start is not None and not overshoots(orbit, settings, start, LEAVE)
+    along = null_direction(orbit)
+    start = leave_along(orbit, settings, along, "BP", LEAVE)
+    assert start is not None and not overshoots(orbit, settings, start, LEAVE, along)
     side = trace_side(orbit, start.point, settings)
     (doubling, *_) = [b for b in side.bifurcations if b.kind is cf.Kind.PD]
     for k in (20, side.count - 20):
-        point = first_point(side.rows.point(k).orbit(orbit.system, orbit.vector, 3), settings)
+        point = first_point(side.rows.point(k).orbit(orbit, 3), settings)
         assert point is not None
         behind = point.value > doubling.params["A"]
-        assert overshoots(orbit, settings, replace(start, point=point), LEAVE) is behind
+        assert overshoots(orbit, settings, replace(start, point=point), LEAVE, along) is behind
     assert behind
 
 
@@ -228,9 +229,9 @@ def test_newton_settles_at_the_rounding_of_an_integrated_flow(distance: float) -
     (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
     orbit = event.orbit.as_whole()
     settings = settings_of(orbit, "A", (19.0, 24.0), None, True, 5000)
-    start = leave_branch_point(orbit, settings, "BP", distance)
+    start = leave_along(orbit, settings, null_direction(orbit), "BP", distance)
     assert start is not None
-    there = start.point.orbit(orbit.system, orbit.vector, 3)
+    there = start.point.orbit(orbit, 3)
     apart = np.linalg.norm(there.joints - orbit.joints) / len(orbit.joints) ** 0.5
     assert apart == pytest.approx(distance, rel=1e-2)
     assert abs(start.point.value - event.params["A"]) < 1e-6 + distance**2

@@ -71,12 +71,12 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     )
     from contfric.models.tied import tied
 
-    loaded, params = tied(model, params)
+    loaded, given = tied(model, params)
     report = ModelReport(loaded.name, closed=loaded.closed_form, integrated=loaded.integrated)
     check_names(report, loaded)
     if params is None and not check_constraints(report, loaded):
         return report  # at such parameters nothing else means anything
-    probe = Probe(loaded, params or {})
+    probe = Probe(loaded, given)
     check_derivatives(report, probe)
     check_surfaces(report, probe)
     check_transitions(report, probe)

@@ -145,11 +145,12 @@ def _runs(
     """Yield the pieces of one stability of a branch: x once, y of every row."""
     branch = diagram.branches[i]
     of_rows = [stability_runs(branch, name) for name in rows]
-    width = diagram.range[1] - diagram.range[0]
     for pieces in zip(*of_rows, strict=True):
         x = pieces[0].x
         columns = np.column_stack([x, *(p.y for p in pieces)])
-        sizes = np.column_stack([np.full(len(x), width), *(local_sizes(p.y) for p in pieces)])
+        sizes = np.column_stack(
+            [np.full(len(x), diagram.width), *(local_sizes(p.y) for p in pieces)]
+        )
         at = kept(columns, sizes, detail.tolerance)
         stable = pieces[0].stable
         style = {True: "stable", False: "unstable", None: "unknown"}[stable]
