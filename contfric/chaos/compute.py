@@ -22,6 +22,7 @@ from contfric.errors import ParameterError, function_of, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.excitation import check_excitation
 from contfric.orbit.time_scale import has_clock
 from contfric.remember.folder import kept_in
 
@@ -208,7 +209,9 @@ def _checked_params(
         defined = np.empty((0, 2), dtype=np.int64)
     i, j = defined[0] if len(defined) else (0, 0)
     example = model.check_params({**params, first: rows[i], second: columns[j]})
-    return model.vector(example), example
+    vector = model.vector(example)
+    check_excitation(model, vector)
+    return vector, example
 
 
 def _all_states(

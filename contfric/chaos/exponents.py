@@ -15,6 +15,7 @@ from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.excitation import check_excitation
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +204,7 @@ def lyapunov_exponent(
     model, params = tied(model, params)
     limits = limits_of(transient, periods, tolerance, confirm)
     vector = model.vector(params)
+    check_excitation(model, vector)
     named = model.mapping(vector)
     if state is None:
         states = default_states(model, named, 1)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.starts import displaced, with_clocks
+from contfric.orbit.starts import displaced, with_clocks, within_a_turn
 from contfric.orbit.time_scale import has_clock
 
 #: A state, shape (n,), several, shape (k, n), or a function of the parameters that returns either.
@@ -94,4 +94,4 @@ def given_states(model: Model, state: StateLike, params: Mapping[str, float]) ->
             f"a state of '{model.name}' is {n} finite numbers ({', '.join(model.states)}), several "
             f"states are rows of them; got {shown(given)}"
         )
-    return states
+    return within_a_turn(model, model.vector(params), states) if model.wraps else states

@@ -20,6 +20,7 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.models.definition import FloatArray, Model
+from contfric.orbit.excitation import check_excitation
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import is_smooth
 from contfric.orbit.system import IntArray, System
@@ -43,6 +44,8 @@ SMALLEST_STEP = 1e-10
 _LEAST_STEP = 1e-8
 #: Widest range for a parameter of this size (1 at least): the smallest step is a tenth of it.
 _RESOLVED = 1e9
+#: Share of the way to the farther end of a range at which the period of the excitation is looked at.
+_BESIDE = 1e-3
 #: Most points of one side of a branch by default.
 MOST_POINTS = 20_000
 #: Extra columns of the tests after the margins and the distances of the labels; the first is the slope
@@ -323,7 +326,8 @@ def settings_of(
     Raises
     ------
     ParameterError
-        For an unknown parameter, an empty, reversed or not finite range, or one without the orbit.
+        For an unknown parameter, an empty, reversed or not finite range, or one without the orbit; or if
+        the excitation has not the model's period along it.
     """
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"continuation starts from an Orbit, got {type(orbit).__name__}")
@@ -358,6 +362,10 @@ def settings_of(
             f"the orbit is at {parameter} = {value:g}, and the range ({low:g}, {high:g}) is so wide that no "
             "step along it would be short there: give the part of it that is of interest"
         )
+    beside = orbit.vector.copy()  # where the parameter is another one, the period may be, too
+    ends = (clipped_low - value, clipped_high - value)
+    beside[model.index_of(parameter)] += _BESIDE * max(ends, key=abs)
+    check_excitation(model, beside)
     return Settings(
         parameter,
         clipped_low,

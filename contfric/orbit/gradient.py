@@ -18,7 +18,7 @@ import numpy as np
 
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
-from contfric.errors import ConvergenceError, ParameterError
+from contfric.errors import ConvergenceError, ParameterError, shown
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.at_once import differentiated_at_once
@@ -95,15 +95,18 @@ def gradient_of(orbit: Orbit, name: str) -> Gradient:
 
 def gradients_of(orbit: Orbit, names: Iterable[str]) -> dict[str, Gradient]:
     """Return the derivatives of several quantities; see :meth:`contfric.Orbit.gradients`."""
-    if isinstance(names, str):
+    given: object = names  # whatever the user gave
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        example = given if isinstance(given, str) else "x_max"
         raise ParameterError(
-            f"gradients takes a list of quantities, such as ['{names}'], got '{names}'"
+            f"gradients takes a list of quantities, such as ['{example}'], got {shown(given)}"
         )
-    names = list(dict.fromkeys(names))
-    quantities = [number_quantity(name, orbit.model, "a gradient") for name in names]
-    found = differentiated_at_once(quantities, orbit, by_parameters(orbit))
+    quantities = {name: number_quantity(name, orbit.model, "a gradient") for name in names}
+    found = differentiated_at_once([*quantities.values()], orbit, by_parameters(orbit))
     events = _events(orbit)
-    return Named((n, _gradient(orbit, n, g, events)) for n, g in zip(names, found, strict=True))
+    return Named(
+        (n, _gradient(orbit, n, g, events)) for n, g in zip(quantities, found, strict=True)
+    )
 
 
 def _gradient(

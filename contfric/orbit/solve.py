@@ -15,6 +15,7 @@ from contfric.models.definition import FloatArray
 from contfric.models.tied import tied
 from contfric.orbit.clock import clocked
 from contfric.orbit.conserved import conserved
+from contfric.orbit.excitation import check_excitation
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import has_sections, named_by_ends
@@ -109,6 +110,7 @@ def solve_orbit(
 
         signature = load_signature(signature, model)
     vector = model.vector(params)
+    check_excitation(model, vector)
     seed = whole_number("seed", seed, least=0)
     function_of("progress", progress)
     itinerary = reduced_itinerary(signature)

@@ -13,6 +13,7 @@ from contfric.models.clocks import TICK, is_clock
 from contfric.models.definition import Domain, FloatArray, Model, Surface
 from contfric.models.parts import Chatter
 from contfric.orbit.entered import StartState, entered_domain
+from contfric.orbit.excitation import check_excitation
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import bits_of
 
@@ -216,7 +217,7 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
     ------
     ParameterError
         If it is not a state of the model, or none is given and none is found; or if the period of the
-        excitation is not positive and finite.
+        excitation is not positive and finite, or not that of all that depends on time.
     """
     period = model.view(vector).period
     if not (model.autonomous or 0.0 < period < np.inf):
@@ -225,6 +226,7 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
             f"the period of the excitation of '{model.name}' is {period:g} at {values}: it has to be above 0 "
             "and finite; a line of 'constraints' keeps parameters from such values"
         )
+    check_excitation(model, vector)
     if state is None:
         # away from rest, so that symmetric and asymmetric attractors can both be reached
         return displaced(model, vector)
@@ -238,7 +240,18 @@ def checked_state(model: Model, vector: FloatArray, state: ArrayLike | None) -> 
             f"a state of '{model.name}' is {len(model.states)} finite numbers "
             f"({', '.join(model.states)}), got {shown(state)}"
         )
-    return y
+    return within_a_turn(model, vector, y)
+
+
+def within_a_turn(model: Model, vector: FloatArray, states: FloatArray) -> FloatArray:
+    """Return states whose angles lie between the two places at which they are cut, shape (..., n)."""
+    found, view = states.copy(), model.view(vector)
+    for k in model.angles:
+        ends = [r.surface for r in model.resets if r.wraps and model.states[k] in r.changes]
+        low, high = sorted(view.level(surface) for surface in ends)
+        y = found[..., k]
+        found[..., k] = np.where((y < low) | (y > high), low + (y - low) % (2.0 * np.pi), y)
+    return found
 
 
 def with_clocks(model: Model, vector: FloatArray, y: FloatArray) -> FloatArray:

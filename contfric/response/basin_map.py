@@ -29,6 +29,8 @@ from contfric.errors import (
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
+from contfric.orbit.excitation import check_excitation
+from contfric.orbit.starts import within_a_turn
 from contfric.orbit.system import IntArray
 from contfric.remember.folder import kept_in
 from contfric.response.attractors import Attractors, given_orbits
@@ -143,7 +145,8 @@ def basins(
     shape = tuple(len(values) for values in axes.values())
     _check_size(model, axes)
     period = model.view(vector).period
-    states = _states(model, axes, fixed)
+    check_excitation(model, vector)
+    states = within_a_turn(model, vector, _states(model, axes, fixed))
     job = _BasinJob(vector, fixed[PHASE] * period, states, periods, tile, executor, progress)
     attractors = Attractors(model, vector)
     for orbit in () if orbits is None else given_orbits(model, vector, orbits):

@@ -66,14 +66,14 @@ def _check(data: Any) -> tuple[list[str], list[Any], int]:
 
 
 def _knot(data: Any, row: Any) -> list[arb]:
-    *joints, value = map(ball, row)
+    *joints, value = map(ball, row[:])
     omega = Scene(data, value).omega
     return [*(c if k % 2 else c * omega for k, c in enumerate(joints)), value]
 
 
 def orbits_at(data: Any, known: Any = ()) -> list[Link]:
     """Return the orbits next to the knots of a curve, the first ones if known; near folds normal to it."""
-    knots = [_knot(data, row) for row in data["knots"]]
+    knots = [_knot(data, row) for row in data["knots"][:]]
     pairs = list(zip(knots, [*knots[1:2], *knots], strict=False))[len(known) :]
     return [*known, *(Link(data, at, None, Link(data, by, at).border).proved() for at, by in pairs)]
 
@@ -111,7 +111,8 @@ def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
 
 def _check_event(data: Any) -> tuple[list[str], list[Any]]:
     kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
-    (found, box), name = events_between(data, a, b, at and (kind, [at])), data["parameter"]
+    name, end = data["parameter"], None if at is None else (kind, [at])
+    found, box = events_between(data, a, b, end)
     see(found == [kind], f"it has those events, not {found}")
     see(value.rad() - abs((near := box.orbits(INSIDE))[0].value - value.mid()), "it is in the ball")
     return ["exists", f"is a {kind} in {name}", "admissible"], [kind, {0: [near] * 2}, [box]]
@@ -120,11 +121,11 @@ def _check_event(data: Any) -> tuple[list[str], list[Any]]:
 def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     data, claims, s = data | {"parameter": "S"}, data["statements"], data["params"]["S"] - 0
     see(claims == ["exists", *(c for c in CLAIMS if c in claims)], "it states what an orbit is")
-    printed, radius = (_knot(data, [*data[name], s])[:-1] for name in ("joints", "radius"))
+    printed, radius = (_knot(data, [*data[name][:], s])[:-1] for name in ("joints", "radius"))
     scene, z = (box := Link(data, [*printed, ball(s)]).proved()).orbits(0)
-    for k, (c, near, r, text) in enumerate(zip(z, printed, radius, data["enclosure"], strict=True)):
+    for k, (c, near, r, b) in enumerate(zip(z, printed, radius, data["enclosure"][:], strict=True)):
         see(r - abs(c - near), "it lies in the box around the printed joints")
-        see(ball(text).contains(c if k % 2 else c / scene.omega), "its ball holds it", False)
+        see(ball(b).contains(c if k % 2 else c / scene.omega), "its ball holds it", False)
     if "unique" in claims:
         Link(data, [*printed, ball(s)]).proved([*radius, arb(0)])
     if "admissible" in claims:
@@ -134,7 +135,7 @@ def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:
     see("unstable" not in claims or -min(jury, key=float), "a multiplier is outside of the circle")
     root, mean = acb(trace * trace / 4 - det).sqrt(), trace / 2
     found = [acb(trace), acb(0)] if det.is_zero() else [mean + root, mean - root]
-    for d, mu in zip(discs := data["multipliers"], found, strict=bool(discs)):
+    for d, mu in zip(discs := data["multipliers"][:], found, strict=bool(discs)):
         see(len(d) == 2 and acb(ball(d["re"]), ball(d["im"])).contains(mu), "its disc", False)
     return claims + ["multipliers"] * bool(discs), [data["params"], {0: [(scene, z)] * 2}, [box]]
 

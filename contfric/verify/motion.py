@@ -72,7 +72,7 @@ class Scene:
         self.square = 1 - self.zeta * self.zeta
         self.root = (self.square if part(self.square, 0) > 0 else acb(1) * self.square).sqrt()
         self.turn, self.closing = periods * arb.pi() * (1 if self.half else 2), 1 - 2 * self.half
-        self.segments = [SEGMENTS[" ".join(row)] for row in data["segments"]]  # direction, exit
+        self.segments = [SEGMENTS[" ".join(row[:])] for row in data["segments"]]  # direction, exit
 
     def force(self, phase: Any) -> list[Any]:
         """Return f with three derivatives by time."""

@@ -130,6 +130,12 @@ def test_what_nobody_looks_at_is_not_in_a_file() -> None:
         {"statements": ["exists", "stable", "stable"]},
         {"statements": ["unique"]},
         {"statements": "exists"},
+        {"enclosure": dict.fromkeys(data["enclosure"], "no ball")},
+        {"joints": {f"{c!r} +/- 1e-20": "another" for c in data["joints"]}},
+        {"radius": {f"{c!r} +/- 0": "another" for c in data["radius"]}},
+        {"segments": [dict.fromkeys(pair, "not so") for pair in data["segments"]]},
+        {"enclosure": data["enclosure"][:-1]},
+        {"multipliers": {}},
     ]
     for change in wrong:
         assert check_text(json.dumps(data)).yes
