@@ -3,6 +3,9 @@
 An orbit whose only joint is an impact that comes to graze, or a rest that vanishes, goes on without any: it
 is smooth after the event.
 So that both are itineraries of one solution, joints are put where the solution crosses a section.
+
+None is put where a wall is touched at that moment (velocity is zero there). An impact of speed zero comes in
+between the joints or goes from there, and an itinerary with a joint at the touch has no place for it.
 """
 
 from __future__ import annotations
@@ -22,22 +25,27 @@ from contfric.orbit.system import build_system
 _MOST, _AT_JOINT = 1000, 1e-8
 #: Crossings whose rates differ by less than this share are equally fast.
 _AS_FAST = 1e-6
+#: A crossing this near to a wall (relative to 1 + its level) is where it is touched: events are located to
+#: 1e-13, some to half of the digits, and another crossing does as well.
+_AT_WALL = 1e-6
 
 
 def divided(whole: Orbit, turns: int) -> Orbit | None:
     """Return a whole orbit with joints on a section too, where all of it that lasts is in one mode.
 
-    One each way in each of the equal ``turns`` of the motion. Rest of no length at a touch vanishes with it.
-    None where there is no section, or where it is of no use.
+    One each way in each of the equal ``turns`` of the motion, where no wall is touched. Rest of no length at a
+    touch vanishes with it. None where there is no section, or where it is of no use.
     """
     model = whole.model
+    if is_smooth(model, whole.itinerary):
+        return _off_walls(whole)
     lasts = whole.ends[:, 0] - whole.cycle[:, 0]
     lasting = {
         model.whole_mode(mode)
         for (mode, _), last in zip(whole.itinerary, lasts, strict=True)
         if last > SHORT * time_unit(whole)
     }
-    if len(lasting) != 1 or is_smooth(model, whole.itinerary):
+    if len(lasting) != 1:
         return None
     (mode,) = lasting
     sections = {s for part, s in model.sections if model.whole_mode(part) == mode}
@@ -59,6 +67,31 @@ def divided(whole: Orbit, turns: int) -> Orbit | None:
     return replace(whole, system=system, joints=found)
 
 
+def _off_walls(whole: Orbit) -> Orbit | None:
+    """Return a smooth orbit without its joints at which a wall is touched; None if all or none are."""
+    count = len(whole.itinerary)
+    modes = [whole.itinerary[i - 1][0] for i in range(count)]  # in which a joint is reached
+    kept = [i for i in range(count) if not _at_wall(whole, modes[i], whole.cycle[i])]
+    if len(kept) in (0, count):
+        return None
+    itinerary = tuple(whole.itinerary[i - 1] for i in [*kept[1:], kept[0]])
+    joints = whole.cycle[kept]
+    system = build_system(whole.model, itinerary, whole.periods)
+    found = clocked(whole.model, joints, float(joints[0, 0]) + whole.period)
+    return replace(whole, system=system, joints=found)
+
+
+def _at_wall(whole: Orbit, mode: str, joint: FloatArray) -> bool:
+    """Tell whether a state is at a surface with a reset."""
+    flow = whole.flow
+    return any(
+        whole.model.reset_at(mode, surface.name) is not None
+        and abs(flow.height(surface.name, float(joint[0]), joint[1:]))
+        < _AT_WALL * (1.0 + abs(flow.level(surface.name)))
+        for surface in whole.model.surfaces
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _Crossing:
     """A crossing of the section: the segment in which it is, its time and state, and how fast it is."""
@@ -78,17 +111,25 @@ class _Crossing:
 
 
 def _by_turns(whole: Orbit, mode: str, surface: str, turns: int) -> list[_Crossing]:
-    """Return the fastest crossings of a surface in a mode, one each way in each turn."""
+    """Return the fastest crossings of a surface in a mode, one each way in each turn.
+
+    One way only where there is no other crossing, or a wall is touched at it.
+    """
     own = [i for i, (part, _) in enumerate(whole.itinerary) if whole.model.whole_mode(part) == mode]
     every = [c for i in own for c in _inside(whole, i, surface)]
-    ways = {way: [c for c in every if c.way == way] for way in (-1, 1)}
-    if not all(ways.values()):
+    free = [c for c in every if not _at_wall(whole, whole.itinerary[c.segment][0], c.joint)]
+    ways = {way: [c for c in free if c.way == way] for way in (-1, 1)}
+    if not free:
         return []
 
     def apart(crossing: _Crossing, time: float) -> float:
         period = whole.period
         return abs((crossing.time - time + 0.5 * period) % period - 0.5 * period)
 
+    if not all(ways.values()):
+        first = max(free, key=lambda c: abs(c.rate)).time
+        again = [first + k * whole.period / turns for k in range(turns)]
+        return [min(free, key=lambda c, t=t: apart(c, t)) for t in again]  # type: ignore[misc]
     down = max(ways[-1], key=lambda c: abs(c.rate)).time
     fast = (1.0 - _AS_FAST) * max(c.rate for c in ways[1])
     half = down + 0.5 * whole.period / turns  # where a symmetric solution has the image

@@ -105,11 +105,14 @@ def loops(
 def canonical(orbit: Orbit) -> Orbit:
     """Return the same orbit without joints on sections that it can do without; most often as it is.
 
-    Orbits of earlier versions have them.
+    Orbits of earlier versions have them. A smooth orbit with one joint has another where it crosses back.
     """
     model, itinerary = orbit.model, orbit.system.itinerary
-    if not has_sections(model, itinerary) or orbit.system.domains or is_smooth(model, itinerary):
+    if not has_sections(model, itinerary) or orbit.system.domains:
         return orbit
+    if is_smooth(model, itinerary):
+        lone = len(itinerary) == 1 and not orbit.system.half and not model.autonomous
+        return (_with_pairs(orbit, 1) if lone else None) or orbit
     if orbit.system.half:
         return canonical(orbit.as_whole())
     start = float(orbit.joints[0, 0])
