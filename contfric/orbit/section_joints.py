@@ -5,7 +5,8 @@ is smooth after the event.
 So that both are itineraries of one solution, joints are put where the solution crosses a section.
 
 None is put where a wall is touched at that moment (velocity is zero there). An impact of speed zero comes in
-between the joints or goes from there, and an itinerary with a joint at the touch has no place for it.
+between the joints or goes from there. Where a solution has no other crossing, as one between two walls that
+touches both, its touches have joints, and the impact takes the place of one.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import is_smooth
+from contfric.orbit.sections import AT_WALL, at_wall, is_smooth, only_touches
 from contfric.orbit.slides import SHORT, time_unit
 from contfric.orbit.system import build_system
 
@@ -25,16 +26,13 @@ from contfric.orbit.system import build_system
 _MOST, _AT_JOINT = 1000, 1e-8
 #: Crossings whose rates differ by less than this share are equally fast.
 _AS_FAST = 1e-6
-#: A crossing this near to a wall (relative to 1 + its level) is where it is touched: events are located to
-#: 1e-13, some to half of the digits, and another crossing does as well.
-_AT_WALL = 1e-6
 
 
 def divided(whole: Orbit, turns: int) -> Orbit | None:
     """Return a whole orbit with joints on a section too, where all of it that lasts is in one mode.
 
-    One each way in each of the equal ``turns`` of the motion, where no wall is touched. Rest of no length at a
-    touch vanishes with it. None where there is no section, or where it is of no use.
+    One each way in each of the equal ``turns`` of the motion, where no wall is touched. Rest of no length at
+    a touch vanishes with it. None where there is no section, or where it is of no use.
     """
     model = whole.model
     if is_smooth(model, whole.itinerary):
@@ -71,7 +69,7 @@ def _off_walls(whole: Orbit) -> Orbit | None:
     """Return a smooth orbit without its joints at which a wall is touched; None if all or none are."""
     count = len(whole.itinerary)
     modes = [whole.itinerary[i - 1][0] for i in range(count)]  # in which a joint is reached
-    kept = [i for i in range(count) if not _at_wall(whole, modes[i], whole.cycle[i])]
+    kept = [i for i in range(count) if not at_wall(whole, modes[i], whole.cycle[i])]
     if len(kept) in (0, count):
         return None
     itinerary = tuple(whole.itinerary[i - 1] for i in [*kept[1:], kept[0]])
@@ -81,15 +79,21 @@ def _off_walls(whole: Orbit) -> Orbit | None:
     return replace(whole, system=system, joints=found)
 
 
-def _at_wall(whole: Orbit, mode: str, joint: FloatArray) -> bool:
-    """Tell whether a state is at a surface with a reset."""
-    flow = whole.flow
-    return any(
-        whole.model.reset_at(mode, surface.name) is not None
-        and abs(flow.height(surface.name, float(joint[0]), joint[1:]))
-        < _AT_WALL * (1.0 + abs(flow.level(surface.name)))
-        for surface in whole.model.surfaces
-    )
+def crossed_at_graze(whole: Orbit, i: int) -> tuple[str, str] | None:
+    """Return the pair of the section that is crossed where segment ``i`` ends with an impact of no speed.
+
+    None where the solution has a joint that is at no touch: then it needs none here without the impact.
+    """
+    model, flow = whole.model, whole.flow
+    if not only_touches(whole):
+        return None
+    end, mode = whole.ends[i], model.whole_mode(whole.itinerary[i][0])
+    for surface in {s for part, s in model.sections if model.whole_mode(part) == mode}:
+        if abs(flow.height(surface, float(end[0]), end[1:])) < AT_WALL:
+            observable = model.surface_by_name[surface].observable
+            rises = flow.rate(mode, observable, float(end[0]), end[1:]) > 0.0
+            return model.section_pairs(mode, surface).get(-1 if rises else 1)
+    return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,10 +121,10 @@ def _by_turns(whole: Orbit, mode: str, surface: str, turns: int) -> list[_Crossi
     """
     own = [i for i, (part, _) in enumerate(whole.itinerary) if whole.model.whole_mode(part) == mode]
     every = [c for i in own for c in _inside(whole, i, surface)]
-    free = [c for c in every if not _at_wall(whole, whole.itinerary[c.segment][0], c.joint)]
+    free = [c for c in every if not at_wall(whole, whole.itinerary[c.segment][0], c.joint)]
     ways = {way: [c for c in free if c.way == way] for way in (-1, 1)}
     if not free:
-        return []
+        return every if only_touches(whole) else []  # else an impact of some speed is a joint
 
     def apart(crossing: _Crossing, time: float) -> float:
         period = whole.period
@@ -154,6 +158,8 @@ def _inside(whole: Orbit, i: int, surface: str) -> list[_Crossing]:
         if hit is None or end - time - hit[0] < _AT_JOINT:
             break
         place, on = np.array([time + hit[0], *hit[1]]), True
+        if place[0] - whole.begins[i, 0] < _AT_JOINT:
+            continue  # behind an impact that grazes
         rate = flow.rate(mode, observable, float(place[0]), place[1:])
         found.append(_Crossing(i, place, rate))
     return found

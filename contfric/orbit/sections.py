@@ -23,6 +23,9 @@ _SMALL = 0.2
 _SAME = 1e-8
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8
+#: A crossing this near to a wall (relative to 1 + its level) is where it is touched, and an impact this slow
+#: grazes: events are located to 1e-13, some to half of the digits.
+AT_WALL = 1e-6
 
 
 def has_sections(model: Model, itinerary: Itinerary) -> bool:
@@ -91,6 +94,31 @@ def joints_left(model: Model, itinerary: Itinerary) -> list[int]:
     """Return the numbers of the joints that a whole cycle keeps without those on sections, in order."""
     kept = _others(model, itinerary)
     return [(kept[-1] + 1) % len(itinerary), *(i + 1 for i in kept[:-1])]
+
+
+def at_wall(whole: Orbit, mode: str, joint: FloatArray) -> bool:
+    """Tell whether a state is at a surface with a reset."""
+    flow = whole.flow
+    return any(
+        whole.model.reset_at(mode, surface.name) is not None
+        and abs(flow.height(surface.name, float(joint[0]), joint[1:]))
+        < AT_WALL * (1.0 + abs(flow.level(surface.name)))
+        for surface in whole.model.surfaces
+    )
+
+
+def only_touches(whole: Orbit) -> bool:
+    """Tell whether all joints of a solution are touches of walls: impacts of no speed, or on a section."""
+    model, flow = whole.model, whole.flow
+    for (mode, exit_), end in zip(whole.itinerary, whole.ends, strict=True):
+        if (mode, exit_) in model.sections:
+            touches = at_wall(whole, mode, end)
+        elif touches := model.reset_at(mode, exit_) is not None:
+            observable = model.surface_by_name[exit_].observable
+            touches = abs(flow.rate(mode, observable, float(end[0]), end[1:])) < AT_WALL
+        if not touches:
+            return False
+    return True
 
 
 def loops(
