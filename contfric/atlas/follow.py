@@ -39,6 +39,7 @@ from contfric.continuation.from_simulation import solutions_near
 from contfric.continuation.incident import incident_forms
 from contfric.continuation.partial_touches import partial_touches
 from contfric.continuation.points import Settings, next_to
+from contfric.orbit.conserved import conserved
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
@@ -173,8 +174,12 @@ def _follow_flow(state: Exploration, event: Event) -> None:
                 state.merge(event, end)
     for itinerary in (w for w in refused if w not in done):
         state.judge(event, reason, Decision.REFUSED, why=refused[itinerary])
-    # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere
-    alone = creeps == refused.keys() or len(orbit.system.layout.conserved) > 0
+    # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere,
+    # and those that stick all along are the continuum at which this begins, each with its own offset
+    others = refused.keys() - creeps
+    alone = len(orbit.system.layout.conserved) > 0 or all(
+        len(conserved(orbit.model, itinerary)) for itinerary in others
+    )
     if creeps and alone and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
 

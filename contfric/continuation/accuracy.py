@@ -21,7 +21,13 @@ import numpy as np
 from contfric.base.attributes import altered, cached_property
 from contfric.continuation.doubling_point import opening
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.gradients import carried, closing, gradient_of, surface_gradient
+from contfric.continuation.gradients import (
+    before_reset,
+    carried,
+    closing,
+    gradient_of,
+    surface_gradient,
+)
 from contfric.continuation.moved_by_errors import UNITS, fold_error, moved_by_errors
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.zero_acceleration import joint_within, stationary_values
@@ -199,6 +205,8 @@ def _gap_gradient(
         if k < len(beside):
             joint = whole.begins[i] if at == i else whole.ends[i]
             gradient[at], slope = surface_gradient(whole, beside[k], joint, active)
+            if at == i:
+                gradient[at], slope = before_reset(whole, i, gradient[at], slope, active)
             break
         k -= len(beside)
     return gradient, slope

@@ -26,7 +26,7 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical, joints_left
+from contfric.orbit.sections import canonical, is_smooth, joints_left
 from contfric.orbit.slides import SAME_SOLUTION
 from contfric.orbit.system import Itinerary, build_system
 
@@ -149,6 +149,8 @@ def _without_sections(orbit: Orbit, away: FloatArray) -> tuple[Orbit, FloatArray
     if plain is orbit:
         return orbit, away
     whole = orbit.as_whole()
+    if is_smooth(orbit.model, whole.system.itinerary):
+        return plain, np.zeros(len(plain.joints))  # nothing comes in
     if orbit.system.half:
         plain, away = plain.as_half(), np.concatenate((away, away))
     left = joints_left(orbit.model, whole.system.itinerary)

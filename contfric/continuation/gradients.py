@@ -52,7 +52,9 @@ def gradient_of(
             touch[0] == orbit.begins[i, 0]
         ):  # the load of a hold that starts on its limit: whether it falls
             mode = orbit.itinerary[i][0]
-            gradient[i], slope = _rate_gradient(orbit, mode, location.surface, touch, active)
+            gradient[i], slope = before_reset(
+                orbit, i, *_rate_gradient(orbit, mode, location.surface, touch, active), active
+            )
             return sign * gradient, sign * slope
         there, slope = surface_gradient(orbit, location.surface, touch, active)
         gradient[i], moves = carried(orbit, i, touch, there, active)
@@ -115,7 +117,7 @@ def _rate_gradient(
 def carried(
     orbit: Orbit, i: int, touch: FloatArray, there: FloatArray, active: int
 ) -> tuple[FloatArray, float]:
-    """Return a gradient at a touch inside of a segment as one on the start of the segment.
+    """Return a gradient at a touch inside of a segment as one on the joint in which the segment begins.
 
     The time of the touch is stationary: it does not move the value.
     """
@@ -126,4 +128,18 @@ def carried(
     gradient = np.empty(m)
     gradient[0] = there[1:] @ (jac[:, 0] - jac[:, 1 + n])
     gradient[1:] = there[1:] @ jac[:, 1 : 1 + n]
-    return gradient, float(there[1:] @ jac[:, 2 + n])
+    return before_reset(orbit, i, gradient, float(there[1:] @ jac[:, 2 + n]), active)
+
+
+def before_reset(
+    orbit: Orbit, i: int, gradient: FloatArray, slope: float, active: int
+) -> tuple[FloatArray, float]:
+    """Return a gradient on the state in which a segment begins as one on its joint: before a reset."""
+    k = orbit.system.layout.resets[i % orbit.system.segments]
+    if k < 0:
+        return gradient, slope
+    surface, joint = orbit.model.surfaces[k].name, orbit.cycle[i]
+    jac = orbit.flow.reset_jacobian(surface, float(joint[0]), joint[1:], active)
+    moved = gradient[1:] @ jac
+    before = np.concatenate([[gradient[0] + moved[0]], moved[1:-1]])
+    return before, slope + float(moved[-1])

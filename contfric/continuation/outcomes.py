@@ -51,6 +51,7 @@ from contfric.continuation.zero_acceleration import (
 from contfric.errors import NotationError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.section_joints import crossed_at_graze
 from contfric.orbit.slides import time_unit
 from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
@@ -120,8 +121,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
             f"another mode follows the impact before segment {location.segment + 1}"
         )
     if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
-        where = f"where segment {location.segment + 1} ends"
-        raise NotationError(f"the wall {location.surface} is met {where}")
+        return _impact_at_joint(orbit, location)
     if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Successor(edit, joints, reason, away)
@@ -352,7 +352,26 @@ def _grazing_impact(orbit: Orbit, location: EventFunction) -> Successor:
         return Successor(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
     behind = (i + 1) % len(itinerary)
     whole = orbit.model.whole_mode
+    reason = f"no impact on {location.surface} after segment {i + 1}"
+    if pair := crossed_at_graze(orbit, i):
+        return Successor(*_renamed(orbit, i, pair), reason)
     if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
-    reason = f"no impact on {location.surface} after segment {i + 1}"
     return Successor(*slides.runs_on(orbit, i, behind), reason)
+
+
+def _impact_at_joint(orbit: Orbit, location: EventFunction) -> Successor:
+    """GS at a reset where a section is crossed: the impact takes the place of the crossing."""
+    i, surface = location.segment, location.surface
+    mode, exit_ = orbit.itinerary[i]
+    if (mode, exit_) not in orbit.model.sections:
+        raise NotationError(f"the wall {surface} is met where segment {i + 1} ends")
+    reason = f"impact at the touch of {surface} where segment {i + 1} ends"
+    return Successor(*_renamed(orbit, i, (orbit.model.whole_mode(mode), surface)), reason)
+
+
+def _renamed(
+    orbit: Orbit, i: int, pair: tuple[str, str]
+) -> tuple[Edit, dict[tuple[int, int], FloatArray]]:
+    """Return the edit that gives a segment another mode and exit, and its joint."""
+    return Edit(frozenset({i}), {}, {i: (pair,)}), {(i, 0): orbit.cycle[i]}

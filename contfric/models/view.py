@@ -188,6 +188,14 @@ class FlowView:
         self.model.flow.reset(k, t, y, self.vector, _NONE, out, _NOTHING)
         return out
 
+    def reset_jacobian(self, surface: str, t: float, y: FloatArray, active: int) -> FloatArray:
+        """Return the derivatives of that state by time, state and a parameter, shape (n, 2 + n)."""
+        k, n = self.model.surface_index[surface], len(y)
+        out, jac = np.empty(n), np.empty((n, 2 + n))
+        y = np.ascontiguousarray(y)
+        self.model.flow.reset(k, t, y, self.vector, _which(active), out, jac)
+        return jac
+
 
 def _which(active: int | None) -> np.ndarray:
     return _NONE if active is None else np.array([active], dtype=np.int64)

@@ -23,6 +23,9 @@ _SMALL = 0.2
 _SAME = 1e-8
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8
+#: A crossing this near to a wall (relative to 1 + its level) is where it is touched, and an impact this slow
+#: grazes: events are located to 1e-13, some to half of the digits.
+AT_WALL = 1e-6
 
 
 def has_sections(model: Model, itinerary: Itinerary) -> bool:
@@ -93,6 +96,31 @@ def joints_left(model: Model, itinerary: Itinerary) -> list[int]:
     return [(kept[-1] + 1) % len(itinerary), *(i + 1 for i in kept[:-1])]
 
 
+def at_wall(whole: Orbit, mode: str, joint: FloatArray) -> bool:
+    """Tell whether a state is at a surface with a reset."""
+    flow = whole.flow
+    return any(
+        whole.model.reset_at(mode, surface.name) is not None
+        and abs(flow.height(surface.name, float(joint[0]), joint[1:]))
+        < AT_WALL * (1.0 + abs(flow.level(surface.name)))
+        for surface in whole.model.surfaces
+    )
+
+
+def only_touches(whole: Orbit) -> bool:
+    """Tell whether all joints of a solution are touches of walls: impacts of no speed, or on a section."""
+    model, flow = whole.model, whole.flow
+    for (mode, exit_), end in zip(whole.itinerary, whole.ends, strict=True):
+        if (mode, exit_) in model.sections:
+            touches = at_wall(whole, mode, end)
+        elif touches := model.reset_at(mode, exit_) is not None:
+            observable = model.surface_by_name[exit_].observable
+            touches = abs(flow.rate(mode, observable, float(end[0]), end[1:])) < AT_WALL
+        if not touches:
+            return False
+    return True
+
+
 def loops(
     model: Model, itinerary: Itinerary, joints: FloatArray, end: float, vector: FloatArray
 ) -> int:
@@ -105,11 +133,14 @@ def loops(
 def canonical(orbit: Orbit) -> Orbit:
     """Return the same orbit without joints on sections that it can do without; most often as it is.
 
-    Orbits of earlier versions have them.
+    Orbits of earlier versions have them. A smooth orbit with one joint has another where it crosses back.
     """
     model, itinerary = orbit.model, orbit.system.itinerary
-    if not has_sections(model, itinerary) or orbit.system.domains or is_smooth(model, itinerary):
+    if not has_sections(model, itinerary) or orbit.system.domains:
         return orbit
+    if is_smooth(model, itinerary):
+        lone = len(itinerary) == 1 and not orbit.system.half and not model.autonomous
+        return (_with_pairs(orbit, 1) if lone else None) or orbit
     if orbit.system.half:
         return canonical(orbit.as_whole())
     start = float(orbit.joints[0, 0])

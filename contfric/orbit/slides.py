@@ -14,6 +14,7 @@ from contfric.base.attributes import cached_property
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import state_within
+from contfric.orbit.sections import only_touches
 
 #: Parts of a cycle that agree to this (nondimensional) are the same solution: the root of rounding.
 SAME_SOLUTION = 1e-5
@@ -52,8 +53,8 @@ def slides_of(orbit: Orbit) -> list[int]:
     lasts = orbit.durations
     some = [i for i in range(len(orbit.itinerary)) if lasts[i] > SHORT * time_unit(orbit)]
     cut = [i for i in some if orbit.itinerary[i - 1] in orbit.model.sections]
-    if cut:  # the only joints that are in every itinerary
-        return cut
+    if cut:  # the only joints that are in every itinerary; of touches any may be an impact or not
+        return some if len(cut) < len(some) and only_touches(orbit) else cut
     found = []
     for k, i in enumerate(some):
         before, mode = some[k - 1], orbit.itinerary[i][0]
