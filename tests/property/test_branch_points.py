@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.crossings import whole_branch
 from contfric.continuation.crossing import _ChainProblem, crossing_near
 from contfric.continuation.events import EndReason
-from contfric.continuation.points import settings_of
+from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.stalls import stalled_at
 
@@ -153,3 +154,12 @@ def test_second_derivatives_from_several_joints_at_once(signature: str) -> None:
         plain[k] = psi @ (problem.at(x + step)[1] - problem.at(x - step)[1]) / 2e-5
     found = problem.hessian(x, psi)
     assert np.allclose(found, 0.5 * (plain + plain.T), atol=1e-6 * np.abs(plain).max())
+
+
+def test_a_range_beyond_a_limit_of_the_model_has_one_step_for_all_branches() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.2, "S0": 0.4})
+    asked = settings_of(orbit, "S", (0.1, 2.0), None, True, MOST_POINTS)
+    assert (asked.high, asked.width) == (0.4, 1.9)  # kinetic friction is at most the static limit
+    first, other = cf.continue_orbit(orbit, "S", (0.1, 2.0)), whole_branch(orbit, asked)
+    assert np.array_equal(other.values, first.values)
+    assert np.array_equal(other.joints, first.joints)
