@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from contfric.compiled import helper
 from contfric.models.parts import MOST_SURFACES
-from contfric.orbit.together import TOGETHER
 
 #: Shares of a period after which it is asked to which side an observable has moved: the first, each ten
 #: times the one before, and how many. As short as the change allows.
@@ -64,23 +63,3 @@ def still_left(functions, tables, before, mode, begun_on, t, y, p, unit, workspa
         if side != 0 and side == side_ahead(functions, mode, c, t, y, p, unit, size, workspace):
             found |= 1 << k
     return found
-
-
-@helper
-def begins_inside(functions, tables, mode, k, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Tell whether a mode that begins on a surface, to rounding, leaves it to the side that it is on itself.
-
-    Where two surfaces are met together, the second one was on the way to its other side before.
-    """
-    own, c, none, empty = (
-        tables.own[mode, k],
-        tables.observables[k],
-        workspace.none,
-        workspace.empty,
-    )
-    level = functions.level(k, p, none, empty)
-    apart = abs(functions.observe(c, t, y, p, none, empty) - level)
-    if own == 0 or tables.bounds[mode, k] != 1 or apart > TOGETHER * (1.0 + abs(level)):
-        return False
-    size = size_of(functions, c, k, t, y, y, p, workspace)
-    return side_ahead(functions, mode, c, t, y, p, unit, size, workspace) == own

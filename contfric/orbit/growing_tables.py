@@ -19,7 +19,6 @@ from contfric.orbit.tables import (
     declared_surfaces,
     flight_table,
     moves_on,
-    side_table,
     sides_of,
     surfaces_under,
 )
@@ -105,7 +104,6 @@ class GrowingTables:
             0,
             chatter_table(model, done),
             flight_table(model, done),
-            side_table(model, done),
         )
 
     def _write(self, name: str) -> None:

@@ -47,7 +47,6 @@ class Tables(NamedTuple):
     landed : surfaces that the state is on where motion goes on, as bits: the one met, but for a reset;
         shape (modes, surfaces)
     walls : surfaces at which a reset sends motion back, as bits
-    own : side of each surface that a mode is on, 0 if it is on both, shape (modes, surfaces)
     """
 
     observables: IntArray
@@ -61,7 +60,6 @@ class Tables(NamedTuple):
     walls: int
     chatters: IntArray
     flights: IntArray
-    own: IntArray
 
 
 def declared_surfaces(model: Model) -> Sequence[Surface]:
@@ -126,19 +124,7 @@ def tables(model: Model) -> Tables:
         bits_of(model, (r.surface for r in model.resets if r.lands.get(r.surface) == 1)),
         chatter_table(model, len(model.modes)),
         flight_table(model, len(model.modes)),
-        side_table(model, len(model.modes)),
     )
-
-
-def side_table(model: Model, modes: int) -> IntArray:
-    """Return the side of each surface that the first modes are on, 0 where one is on both."""
-    found = np.zeros((modes, len(model.surfaces)), dtype=np.int64)
-    for k, mode in enumerate(model.modes[:modes]):
-        parts = [d.signs for d in model.domains if d.own_mode == mode.name]
-        for i, surface in enumerate(model.surfaces):
-            sides = {signs.get(surface.name, 0) for signs in parts}
-            found[k, i] = sides.pop() if len(sides) == 1 else 0
-    return found
 
 
 def chatter_table(model: Model, modes: int) -> IntArray:

@@ -7,7 +7,7 @@ from contfric.models.parts import MOST_SURFACES
 
 #: Distance, relative to 1 + its level, within which a surface is met together with another one: far above
 #: what rounding leaves of the same solution, far below what tells two events apart.
-TOGETHER = 1e-12
+_TOGETHER = 1e-12
 
 
 @helper
@@ -33,7 +33,7 @@ def mode_together(functions, tables, mode, surface, code, t, y, p, workspace):  
         if k != surface:
             level = functions.level(k, p, none, empty)
             value = functions.observe(tables.observables[k], t, y, p, none, empty)
-            if abs(value - level) <= TOGETHER * (1.0 + abs(level)):
+            if abs(value - level) <= _TOGETHER * (1.0 + abs(level)):
                 if tables.bounds[mode, k] == 1:
                     together |= 1 << k
                 else:

@@ -18,7 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.models.parts import MOST_SURFACES
-from contfric.orbit.ahead import begins_inside, still_left
+from contfric.orbit.ahead import still_left
 from contfric.orbit.resting import impacts_ahead, still_bounced
 from contfric.orbit.sides import flight_of, leads_to, mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
@@ -37,8 +37,7 @@ from contfric.orbit.walls import (
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
-    [indices, table, indices, table, indices, indices, table, table, i8, table, indices, table],
-    Tables,
+    [indices, table, indices, table, indices, indices, table, table, i8, table, indices], Tables
 )
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
@@ -100,15 +99,15 @@ def first_hit(functions, tables, mode, on, t, y, p, longest, unit, workspace):  
     """
     within = HOLD_PERIODS * unit
     while within < longest:
-        tau, surface = hit_within(functions, tables, mode, on, t, y, p, within, unit, workspace)
+        tau, surface = hit_within(functions, tables, mode, on, t, y, p, within, workspace)
         if surface >= 0:
             return tau, surface
         within *= _WIDER
-    return hit_within(functions, tables, mode, on, t, y, p, longest, unit, workspace)
+    return hit_within(functions, tables, mode, on, t, y, p, longest, workspace)
 
 
 @helper
-def hit_within(functions, tables, mode, on, t, y, p, longest, unit, workspace):  # type: ignore[no-untyped-def]
+def hit_within(functions, tables, mode, on, t, y, p, longest, workspace):  # type: ignore[no-untyped-def]
     """Do the same over one time."""
     observables, bounds, none, empty = (
         tables.observables,
@@ -123,11 +122,6 @@ def hit_within(functions, tables, mode, on, t, y, p, longest, unit, workspace): 
         target = functions.level(k, p, none, empty)
         started = k < MOST_SURFACES and (on >> k) & 1 == 1
         tau = functions.hit(mode, observables[k], target, started, t, y, best, p, workspace.trial)
-        if 0.0 <= tau <= NO_TIME * unit and not started:
-            started = begins_inside(functions, tables, mode, k, t, y, p, unit, workspace)
-            tau = functions.hit(
-                mode, observables[k], target, started, t, y, best, p, workspace.trial
-            )
         if tau >= 0.0 and (which < 0 or tau < best):
             best, which = tau, k
             copy_state(workspace.trial, workspace.after)
