@@ -18,7 +18,7 @@ import numpy as np
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import AT_WALL, at_wall, is_smooth, only_touches
+from contfric.orbit.sections import at_wall, is_smooth, lies_on, only_touches
 from contfric.orbit.slides import SHORT, time_unit
 from contfric.orbit.system import build_system
 
@@ -89,8 +89,8 @@ def crossed_at_graze(whole: Orbit, i: int) -> tuple[str, str] | None:
         return None
     end, mode = whole.ends[i], model.whole_mode(whole.itinerary[i][0])
     for surface in {s for part, s in model.sections if model.whole_mode(part) == mode}:
-        if abs(flow.height(surface, float(end[0]), end[1:])) < AT_WALL:
-            observable = model.surface_by_name[surface].observable
+        observable = model.surface_by_name[surface].observable
+        if lies_on(whole, surface, end):
             rises = flow.rate(mode, observable, float(end[0]), end[1:]) > 0.0
             return model.section_pairs(mode, surface).get(-1 if rises else 1)
     return None

@@ -8,6 +8,7 @@ crosses them more often is a label. (Without excitation it keeps as many as it h
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +24,11 @@ _SMALL = 0.2
 _SAME = 1e-8
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8
-#: A crossing this near to a wall (relative to 1 + its level) is where it is touched, and an impact this slow
-#: grazes: events are located to 1e-13, some to half of the digits.
+#: A crossing this near to a wall (relative to the largest height of the orbit) is where it is touched, and an
+#: impact this slow (relative to its largest rate) grazes: events are located to 1e-13, some to half of that.
 AT_WALL = 1e-6
+#: Where along an orbit sizes are taken: no two symmetric, not all at a touch.
+_SHARES = (0.03, 0.19, 0.31, 0.43, 0.57, 0.66, 0.78, 0.91)
 
 
 def has_sections(model: Model, itinerary: Itinerary) -> bool:
@@ -98,13 +101,21 @@ def joints_left(model: Model, itinerary: Itinerary) -> list[int]:
 
 def at_wall(whole: Orbit, mode: str, joint: FloatArray) -> bool:
     """Tell whether a state is at a surface with a reset."""
-    flow = whole.flow
-    return any(
-        whole.model.reset_at(mode, surface.name) is not None
-        and abs(flow.height(surface.name, float(joint[0]), joint[1:]))
-        < AT_WALL * (1.0 + abs(flow.level(surface.name)))
-        for surface in whole.model.surfaces
-    )
+    walls = (s.name for s in whole.model.surfaces if whole.model.reset_at(mode, s.name) is not None)
+    return any(lies_on(whole, wall, joint) for wall in walls)
+
+
+def lies_on(whole: Orbit, surface: str, joint: FloatArray) -> bool:
+    """Tell whether a state is on a surface, measured by how far from it the orbit comes."""
+    height = abs(whole.flow.height(surface, float(joint[0]), joint[1:]))
+    return height < AT_WALL * max(abs(whole.flow.height(surface, t, y)) for t, y in _along(whole))
+
+
+def _along(whole: Orbit) -> Iterator[tuple[float, FloatArray]]:
+    """Yield some times and states of an orbit: its sizes."""
+    for share in _SHARES:
+        time = float(whole.cycle[0, 0]) + share * whole.period
+        yield time, whole.state(time)
 
 
 def only_touches(whole: Orbit) -> bool:
@@ -115,7 +126,9 @@ def only_touches(whole: Orbit) -> bool:
             touches = at_wall(whole, mode, end)
         elif touches := model.reset_at(mode, exit_) is not None:
             observable = model.surface_by_name[exit_].observable
-            touches = abs(flow.rate(mode, observable, float(end[0]), end[1:])) < AT_WALL
+            fastest = max(abs(flow.rate(mode, observable, t, y)) for t, y in _along(whole))
+            rate = abs(flow.rate(mode, observable, float(end[0]), end[1:]))
+            touches = rate < AT_WALL * fastest
         if not touches:
             return False
     return True
