@@ -44,22 +44,17 @@ def conserved(model: Model, itinerary: Itinerary) -> FloatArray:
     n = len(model.states)
     if not model.definition:  # of functions of its own: such a model says nothing of its fields
         return np.empty((0, n))
-    changes, places = np.empty((n, 0)), np.empty((n, 0))
-    for mode in dict.fromkeys(mode for mode, _ in itinerary):
-        rates, apart = _along(model, mode)
-        changes, places = np.hstack([changes, rates]), np.hstack([places, apart])
-        if not model.composed and _rank(changes) == n:  # else each mode has few columns
-            return np.empty((0, n))
+    modes = dict.fromkeys(mode for mode, _ in itinerary)
+    still = np.eye(n)
+    for mode in modes:
+        still = _kept(still, _along(model, mode)[0])
+        if not len(still):
+            return still
     for surface in dict.fromkeys(
         exit_ for mode, exit_ in itinerary if model.reset_at(mode, exit_) is not None
     ):
-        changes = np.hstack([changes, _jumps(model, surface)])
-    # all directions of the states, and of many columns not all of theirs
-    left, sizes, _ = np.linalg.svd(changes, full_matrices=changes.shape[1] < n)
-    rank = int(np.sum(sizes > _ZERO))
-    still = left[:, rank:].T
-    if not len(still):
-        return np.empty((0, n))
+        still = _kept(still, _jumps(model, surface))
+    places = np.hstack([_along(model, mode)[1] for mode in modes])
     own, sizes, _ = np.linalg.svd(still @ places, full_matrices=False)
     return np.ascontiguousarray(own[:, : int(np.sum(sizes > _ZERO))].T @ still)
 
@@ -73,9 +68,11 @@ def kept_by(closure: FloatArray, directions: FloatArray) -> FloatArray:
     return np.ascontiguousarray(left[:, sizes <= _ZERO].T @ directions)
 
 
-def _rank(changes: FloatArray) -> int:
-    sizes = np.linalg.svd(changes, compute_uv=False)
-    return int(np.sum(sizes > _ZERO))
+def _kept(still: FloatArray, changes: FloatArray) -> FloatArray:
+    """Return those of some directions, orthonormal rows, along which no change has a part."""
+    # all directions, and of many changes not all of theirs
+    left, sizes, _ = np.linalg.svd(still @ changes, full_matrices=changes.shape[1] < len(still))
+    return np.ascontiguousarray(left[:, int(np.sum(sizes > _ZERO)) :].T @ still)
 
 
 @cache

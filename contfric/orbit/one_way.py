@@ -95,7 +95,8 @@ def _growing(
         slopes.append(slope)
         off.append(changes - np.outer(heights, slope))
         largest = max(largest, float(np.max(np.abs(heights))))
-    _, sizes, right = np.linalg.svd(np.vstack(off))
+    left_over = np.vstack(off)
+    _, sizes, right = np.linalg.svd(left_over, full_matrices=len(left_over) < len(still))
     explained = right[int(np.sum(sizes > _ZERO * largest)) :].T
     weights = _of_one_sign(np.array(slopes) @ explained)
     return tuple(mode for mode, weight in zip(modes, weights, strict=True) if weight > _ZERO)

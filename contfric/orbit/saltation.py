@@ -31,8 +31,9 @@ from contfric.signature.holds import is_hold
 
 #: Fields that differ by less than this share of each rate's size, at all states, are equal there: rounding.
 _SAME = 1e-9
-#: States at which fields are compared, beyond the number of states, and at how many sets of parameters.
-_MORE, _SETS = 4, 2
+#: States at which fields are compared, and at how many sets of parameters. Whether changes are none, of one
+#: direction or of more, two random states tell; the others are there as not all land on the surface.
+_STATES, _SETS = 6, 2
 #: States at which the direction is asked for where it is known to be one: it is taken where the change is
 #: largest, and vanishes at all of these by no accident.
 _FEW = 4
@@ -163,12 +164,12 @@ def _lies_on(model: Model, mode: str) -> set[str]:
 def _fields(
     view: FlowView, mode: str, surface: str, following: str
 ) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield the fields of two modes at random states on the surface between them, as many as tell a rank."""
+    """Yield the fields of two modes at random states on the surface between them."""
     model = view.model
     surfaces = sorted({surface} | _lies_on(model, mode) | _lies_on(model, following))
     draw = np.random.default_rng(1)
     wide = np.abs(model.spread(model.mapping(view.vector)))
-    for _ in range(len(wide) + _MORE):
+    for _ in range(_STATES):
         t, y = float(draw.uniform(0.0, view.period or 10.0)), draw.uniform(-2.0, 2.0, len(wide))
         landed = view.landed(surfaces, t, wide * y, _ON)
         if landed is not None:

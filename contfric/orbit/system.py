@@ -309,6 +309,7 @@ def _margins(
     names = [s.name for s in model.surfaces]
     interior: list[tuple[int, ...]] = []
     joint: list[tuple[int, ...]] = []
+    pinned = {(h.segment - 1, h.pin) for h in holds}
     for i, (mode, exit_) in enumerate(itinerary):
         own = model.chatter_by_mode.get(mode)
         if own is not None and not own.other:  # its flights stay on their side of the wall
@@ -324,8 +325,7 @@ def _margins(
                 interior.append((i, model.surface_index[surface], sign))
         for surface in names:
             sign = ending[i].get(surface, 0)
-            pinned = any(h.segment == i + 1 and h.pin == surface for h in holds)
-            if surface == exit_ or pinned or sign == 0:
+            if sign == 0 or surface == exit_ or (i, surface) in pinned:
                 continue
             joint.append((i, model.surface_index[surface], sign, 0))
     tests = (
