@@ -184,8 +184,9 @@ def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any])
         factors = (
             (_factor(x, k, tuple(moving)), s) for k, s in itertools.chain(known.items(), sums)
         )
-        factor, s = next(((f, s) for f, s in factors if f != 0), (0, 0))
-        return -s * Sign(-factor) if s and factor.could_extract_minus_sign() else s * Sign(factor)
+        factor, s = next(((f, s) for f, s in factors if f != 0), (sympy.Integer(0), 0))
+        minus = factor.could_extract_minus_sign()
+        return -s * Sign(-factor) if minus else s * Sign(factor)
 
     def side(x: Any) -> Any:
         if not x.free_symbols & moved:

@@ -354,3 +354,27 @@ modes:
     assert any("a slide in 'stick' meets 'gate'" in f.message for f in found.findings)
     both = report_of(tmp_path, text.replace(", gate: SIDE", ""))
     assert not any("a slide in" in f.message for f in both.findings)
+
+
+TWISTING = """
+name: twisting
+states: [s, v]
+parameters: {a: 1.5, b: 0.5, A: 1.3, w: 1.0, c: 0.2}
+period: 2*pi/w
+surfaces: {s: {observable: s}, v: {observable: v, sliding: filippov}, far: {observable: sin(s), level: 2}}
+field: {s: v, v: -c*v - a*sign(s) - b*sign(v) + A*cos(w*t)}
+modes:
+  pp: {in: {s: +, v: +}}
+  pn: {in: {s: +, v: -}}
+  np: {in: {s: -, v: +}}
+  nn: {in: {s: -, v: -}}
+"""
+
+
+def test_an_end_of_derived_sliding_that_no_state_has_is_no_warning(tmp_path: Path) -> None:
+    """Sliding ends where A cos(w t) = a - b, never at a + b; nobody wrote that surface."""
+    path = tmp_path / "twisting.yaml"
+    path.write_text(TWISTING, "utf-8")
+    said = str(check_model(cf.load_model(path)))
+    assert "no state was found on surface 'far'" in said
+    assert "surface 'slide" not in said

@@ -39,12 +39,18 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
                     "that changes its sign there with a slope, such as x in place of x**2",
                 )
                 break
-        if not reached:
+        if not reached and not _ends_derived(probe.model, surface):
             report.warn(
                 Topic.SURFACES,
                 f"no state was found on surface '{surface.name}' ({surface.observable} = "
                 f"{surface.level}): if solutions reach it, enlarge 'spread'; else leave it out",
             )
+
+
+def _ends_derived(model: Model, surface: Surface) -> bool:
+    """Tell whether a surface ends a derived sliding mode: nobody wrote it, and one end may be all."""
+    mode = surface.name[:-1]
+    return mode.startswith("slide") and mode in model.mode_by_name
 
 
 def check_transitions(report: ModelReport, probe: Probe) -> None:
