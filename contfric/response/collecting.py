@@ -29,6 +29,9 @@ _GROWTH = 4
 #: A return that differs by this many units of the model's rounding is a return to the same point: what
 #: is left of a thousand such steps is 1e-11.
 _ROUNDINGS = 10.0
+#: Points of one period and the next that differ by less (relative to 1 + their size) are the same, as
+#: those of an orbit are (:mod:`contfric.orbit.repetition`).
+_SAME = 1e-8
 
 
 def repeats_of(model: Model) -> float:
@@ -94,7 +97,45 @@ def collect(
                 progress(f"{len(points.times)} points")
             points = _longer(points)
         state = carried.copy() if how.carried else state
-    return points.first(int(ends.upto[-1]) if count else 0), ends
+    found = points.first(int(ends.upto[-1]) if count else 0)
+    return (found if model.autonomous else _shortest(model, vectors, found, ends)), ends
+
+
+def _shortest(
+    model: Model, vectors: FloatArray, points: SectionPoints, ends: Ends
+) -> SectionPoints:
+    """Return the points of the fewest periods after which each solution repeats itself; ``ends`` is set.
+
+    One that spirals in, or comes from two sides in turn, is near to a state of several periods ago first.
+    """
+    kept, fewer = np.ones(len(points.times), dtype=bool), np.zeros_like(ends.upto)
+    for row in np.flatnonzero(ends.turns > 1):
+        first, last = int(ends.upto[row - 1]) if row else 0, int(ends.upto[row])
+        part, turns = slice(first, last), int(ends.turns[row])
+        period, states = model.view(vectors[row]).period, points.states[part]
+        times, modes = points.cycles[part] * period + points.times[part], points.modes[part]
+        for less in (d for d in range(1, turns) if turns % d == 0):
+            step, rest = divmod((last - first) * less, turns)
+            if rest or not step or not np.array_equal(modes[step:], modes[:-step]):
+                continue
+            late = np.abs(times[step:] - times[:-step] - less * period)
+            off = np.abs(states[step:] - states[:-step])
+            if late.max() < _SAME * (1.0 + period) and np.all(
+                off < _SAME * (1.0 + np.abs(states[step:]))
+            ):
+                ends.turns[row], fewer[row] = less, last - first - step
+                kept[first + step : last] = False
+                break
+    if not fewer.any():
+        return points
+    ends.upto[:] -= np.cumsum(fewer)
+    return SectionPoints(
+        np.array([int(kept.sum())]),
+        points.cycles[kept],
+        points.modes[kept],
+        points.times[kept],
+        points.states[kept],
+    )
 
 
 def _goes_on(outcome: int) -> bool:

@@ -295,3 +295,61 @@ def test_both_is_direction_in_one_word() -> None:
     for both, direction in ((True, "both"), (False, "up")):
         one = cf.sweep("coulomb", "Omega", values, fixed, both=both)
         assert bits(one) == bits(cf.sweep("coulomb", "Omega", values, fixed, direction=direction))
+
+
+SPIRAL = """
+name: spiral
+states: [x, v]
+parameters: {d: 0.01, w: 1.5, F: 1.0}
+period: 2*pi
+surfaces: {turn: {observable: v}}
+field: {x: v, v: "F*cos(t) - 2*d*v - (w**2 + d**2)*x"}
+modes: {up: {in: {turn: +}}, down: {in: {turn: -}}}
+"""
+NEURON = """
+name: neuron
+states: [V]
+parameters: {I: 1.2, A: 0.3, W: 2.4}
+period: 2*pi/W
+surfaces: {threshold: {observable: V, level: 1}}
+modes: {rest: {in: {threshold: -}, field: {V: -V + I + A*cos(W*t)}}}
+resets: {threshold: {V: 0}}
+"""
+
+
+@pytest.mark.parametrize("section", ["stops", 0.37])
+@pytest.mark.parametrize("w", [1.5, 2.5, 0.5])
+def test_the_fewest_periods_are_found(section: str | float, w: float, tmp_path: Path) -> None:
+    """Where solutions come from two sides in turn, they are near to their state of two periods ago first.
+
+    The solution of a linear oscillator has one period; its multipliers are exp(2 pi (-d +- i w)).
+    """
+    path = tmp_path / "spiral.yaml"
+    path.write_text(SPIRAL)
+    values = np.sort(np.random.default_rng(4).uniform(0.005, 0.05, 25))
+    found = cf.sweep(path, "d", values, {"w": w}, section=section, periods=1900, both=False).up
+    assert set(found.periods.tolist()) == {1}
+    per_period = 2 if section == "stops" else 1
+    assert np.bincount(found.index).tolist() == [per_period] * len(values)
+    if section != "stops":
+        t = 0.37 * 2 * np.pi
+        exact = ((w**2 + values**2 - 1) * np.cos(t) + 2 * values * np.sin(t)) / (
+            (w**2 + values**2 - 1) ** 2 + 4 * values**2
+        )
+        np.testing.assert_allclose(found.states[:, 0], exact, atol=1e-9)
+
+
+@pytest.mark.parametrize("section", ["threshold", 0.2])
+def test_solutions_of_several_periods_keep_them(section: str | float, tmp_path: Path) -> None:
+    """At the threshold all states are the same; the times between them are not."""
+    path = tmp_path / "neuron.yaml"
+    path.write_text(NEURON)
+    values = np.linspace(2.0, 3.0, 21)
+    found = cf.sweep(path, "W", values, section=section, periods=600, both=False).up
+    checked = 0
+    for value, periods in zip(values, found.periods, strict=True):
+        if periods > 1:
+            orbit = cf.find_orbit(path, {"W": value})
+            assert orbit.periods == periods
+            checked += 1
+    assert checked > 2
