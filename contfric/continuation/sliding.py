@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.holds_forward import with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
@@ -37,6 +39,10 @@ _NEARLY_REACHED = 1e-5
 _ROUGHLY = 2.0 * ACCURACY
 #: How far a located point is moved back (arclength): where a slide vanishes joints are known to no more.
 _BACK = (1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7)
+#: Share of a margin that is left where its sign changes by a jump; where it vanishes that is rounding.
+_JUMPS = 1e-2
+#: Share of a turn to which the shortest slides are known: the cube root of rounding.
+_KNOWN = 1e-5
 #: A margin this negative is no rounding of a sum of a few terms of order 1.
 _NEGATIVE = 1e-14
 #: Share of the period below which a stick at a tangential release has vanished: the square root of
@@ -54,6 +60,7 @@ def sliding_events(
     first, point = located
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
+    left = _left_by_jump(before, point, first, orbit.turn)
     tip = nearer_than_twins(orbit, before, point, settings)
     if tip is not None and (found := nearly_reached(orbit, tip, settings)) is not None:
         return [(found, tip)]
@@ -87,9 +94,22 @@ def sliding_events(
     )
     group = _once(here, group)
     found = bifurcation_at(kind, here, before, None, point, settings, group)
-    point.rough = rough
+    point.rough = rough or left > 0.0
+    known = max(known, min(_NEARLY_REACHED, left / settings.width))
     known = ROUGHLY_REACHED if rough else known
     return [(replace(found, bound=max(found.accuracy, known)) if known > 0.0 else found, point)]
+
+
+def _left_by_jump(before: Point, point: Point, first: int, turn: float) -> float:
+    """Return what is left of a margin where it changes its sign; 0 where it vanishes.
+
+    It jumps where the last trials went over to another curve: what was located lies before the event. Where a
+    slide is as short as it is known to (its cube root of rounding) every step may go to another curve.
+    """
+    left, times = float(point.tests[first]), before.joints[:, 0]
+    jumps = not point.lost and left > max(_REACHED, _JUMPS * float(before.tests[first]))
+    lasts = float(np.diff(times, append=times[0] + turn).min())
+    return left if jumps and lasts > _KNOWN * turn else 0.0
 
 
 def _first_located(

@@ -129,6 +129,20 @@ def test_no_slide_moves_nothing_all_along_a_branch() -> None:
     assert slides > 300
 
 
+def test_an_event_is_no_jump_to_another_curve() -> None:
+    """Without damping curves of asymmetric slides cross next to a switching-sliding: they are not its end."""
+    found = restarts.scene(50, 369)
+    orbit = cf.find_orbit("coulomb", {**found.params, "h": 0.057}, longest=300)
+    explored = cf.explore(orbit, "h", (0.056, 0.075), max_periods=1)
+    (bridge,) = (b for b in explored.branches if b.name == "2a, 10seg, 1hold" and not b.mirrored)
+    symmetric = [e.params["h"] for e in explored.of_kind("SS") if e.symmetric]
+    rng, known = np.random.default_rng(1), min(symmetric)
+    for step in (0.0031, *rng.uniform(1e-3, 0.01, 9)):
+        again = cf.continue_orbit(bridge[len(bridge) // 2], "h", (0.056, 0.075), max_step=step)
+        assert abs(again.values.min() - known) < 5e-8, step  # a slide is known to 2e-5 there
+        assert all(point.admissible for point in again), step
+
+
 def test_a_doubling_just_before_a_tangential_release() -> None:
     """There a multiplier passes -1, then infinity: at the located release its sign is that of rounding."""
     found = restarts.scene(34, 476)
