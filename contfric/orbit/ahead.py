@@ -19,6 +19,9 @@ _MOVED = 2e-14
 #: How far beyond a surface, relative to 1 + its level, a state lies by rounding: as far as surfaces that are
 #: met together are apart (:mod:`contfric.orbit.together`). No mode begins beyond its surfaces otherwise.
 _BEYOND = 1e-12
+#: How far before a surface a state lies on it: what its observable may be off by, against what that is summed
+#: up from, as at a start. A root that is nearer cannot be told from the time of the start.
+_ON = 16.0 * 2.0**-52
 
 
 @helper
@@ -57,10 +60,10 @@ def side_ahead(functions, mode, observable, t, y, p, unit, size, workspace):  # 
 def begun_on(functions, tables, mode, on, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
     """Return (surfaces, as bits, that a mode begins on and keeps to its side of; one that it crosses, or -1).
 
-    The state is on these or a rounding beyond, and they are not among those that are known (``on``). An
+    The state is on these but for rounding, and they are not among those that are known (``on``). An
     element that has stopped at its limit stands there until a mass next to it is released, what sticks may
     keep a velocity of rounding, and contacts that stop together do so one after the other. Where the state
-    is beyond a surface and goes on, no root is ahead: the surface is met at once.
+    crosses a surface at once, there may be no root ahead.
     """
     kept, observed, value = 0, -1, 0.0
     for k in range(min(tables.observables.shape[0], MOST_SURFACES)):
@@ -73,8 +76,10 @@ def begun_on(functions, tables, mode, on, t, y, p, unit, workspace):  # type: ig
             value = functions.observe(c, t, y, p, workspace.none, workspace.empty)
         level = functions.level(k, p, workspace.none, workspace.empty)
         beyond = (level - value) * side
-        if 0.0 <= beyond <= _BEYOND * (1.0 + abs(level)):
+        if abs(beyond) <= _BEYOND * (1.0 + abs(level)):
             size = size_of(functions, c, k, t, y, y, p, workspace)
+            if beyond < -_ON * size:
+                continue
             if side_ahead(functions, mode, c, t, y, p, unit, size, workspace) == -side:
                 return kept, k
             kept |= 1 << k
