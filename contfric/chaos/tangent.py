@@ -36,7 +36,6 @@ import numpy as np
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
 from contfric.models.definition import FloatArray
-from contfric.orbit.ahead import still_left
 from contfric.orbit.resting import still_bounced
 from contfric.orbit.sides import mode_after
 from contfric.orbit.system import IntArray
@@ -52,7 +51,7 @@ from contfric.orbit.trajectory import (
     TOO_LARGE,
     StateWorkspace,
     copy_state,
-    first_hit,
+    first_met,
     impacts_left,
     sides_after,
     whole_turns,
@@ -76,9 +75,9 @@ ARRIVED, BROKEN = 0, 10
 _HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
 #: What a transit knows of events: how many in a row followed each other at once; what the model has; whether
 #: an impact was among them; 1 + the wall that was met last, if impacts go on alike since; how many impacts to
-#: come are known not to lead to rest; of a segment of no length the surfaces that it began on and its mode.
-EVENTS = 7
-IN_A_ROW, MODEL, STRUCK, BOUNCED, LEFT, BEGUN_ON, BEFORE = range(EVENTS)
+#: come are known not to lead to rest.
+EVENTS = 5
+IN_A_ROW, MODEL, STRUCK, BOUNCED, LEFT = range(EVENTS)
 #: What a model has, added: no excitation, walls (resets), a clock.
 AUTONOMOUS, WALLS, CLOCK = 1, 2, 4
 
@@ -119,7 +118,7 @@ def set_model(transit, tables, timeless, ticks):  # type: ignore[no-untyped-def]
 def forget_events(transit):  # type: ignore[no-untyped-def]
     """Forget the events of another solution."""
     transit.events[IN_A_ROW] = transit.events[STRUCK] = 0
-    transit.events[BOUNCED] = transit.events[LEFT] = transit.events[BEGUN_ON] = 0
+    transit.events[BOUNCED] = transit.events[LEFT] = 0
 
 
 @helper
@@ -200,21 +199,15 @@ def to_joint(functions, tables, mode, on, t, p, period, transit, workspace):  # 
             on |= lying_on(functions, tables, t, y, p, workspace)
             break
     while True:
-        if transit.events[BEGUN_ON] != 0:  # without time, what was left before is left still
-            before, begun_on = transit.events[BEFORE], transit.events[BEGUN_ON]
-            on |= still_left(functions, tables, before, mode, begun_on, t, y, p, period, workspace)
-            transit.meets[0] = SINGLY  # from here on it was not asked for
         tau, surface = transit.ahead[0], transit.meets[0]
         if surface == SINGLY:
-            tau, surface = first_hit(
+            tau, surface = first_met(
                 functions, tables, mode, on, t, y, p, longest, period, workspace
             )
         if surface < 0:
             held = tables.sliding[mode] != 0
             return HELD if held else QUIET, surface, mode, duration, turns, t
         copy_state(workspace.after, y)
-        transit.events[BEGUN_ON] = on if tau <= NO_TIME * period else 0
-        transit.events[BEFORE] = mode
         t, duration = t + tau, duration + tau
         more, t = whole_turns(t, period)
         turns += more

@@ -1,9 +1,9 @@
 """To which side a solution leaves a surface that it begins on, compiled.
 
-A solution that meets a surface as soon as it begins has still its other surfaces under it: those that it
-was leaving when the mode changed. Whether such a surface is left by the mode that follows as well, or is met
-at once, is asked as at a start (:mod:`contfric.orbit.entered`): by the first change of the observable that is
-more than rounding.
+Where a mode begins, the state may lie on more of its surfaces than the one that was met: those that a segment
+of no length was leaving, and those that a contact at rest stands on. Whether such a surface is met at once is
+asked as at a start (:mod:`contfric.orbit.entered`): by the first change of the observable that is more than
+rounding.
 """
 
 from __future__ import annotations
@@ -16,6 +16,12 @@ from contfric.models.parts import MOST_SURFACES
 _FIRST_STEP, _STEPS = 1e-8, 6
 #: The change that counts, against what the observable is summed up from: a hundred roundings.
 _MOVED = 2e-14
+#: How far beyond a surface, relative to 1 + its level, a state lies by rounding: as far as surfaces that are
+#: met together are apart (:mod:`contfric.orbit.together`). No mode begins beyond its surfaces otherwise.
+_BEYOND = 1e-12
+#: How far before a surface a state lies on it: what its observable may be off by, against what that is summed
+#: up from, as at a start. A root that is nearer cannot be told from the time of the start.
+_ON = 16.0 * 2.0**-52
 
 
 @helper
@@ -51,15 +57,30 @@ def side_ahead(functions, mode, observable, t, y, p, unit, size, workspace):  # 
 
 
 @helper
-def still_left(functions, tables, before, mode, begun_on, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Return those of the surfaces that a mode of no length began on which the next mode leaves alike."""
-    found = 0
+def begun_on(functions, tables, mode, on, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
+    """Return (surfaces, as bits, that a mode begins on and keeps to its side of; one that it crosses, or -1).
+
+    The state is on these but for rounding, and they are not among those that are known (``on``). An
+    element that has stopped at its limit stands there until a mass next to it is released, what sticks may
+    keep a velocity of rounding, and contacts that stop together do so one after the other. Where the state
+    crosses a surface at once, there may be no root ahead.
+    """
+    kept, observed, value = 0, -1, 0.0
     for k in range(min(tables.observables.shape[0], MOST_SURFACES)):
-        if begun_on >> k & 1 == 0 or tables.bounds[mode, k] != 1 or tables.bounds[before, k] != 1:
+        side = tables.inside[mode, k]
+        if side == 0 or tables.bounds[mode, k] != 1 or on >> k & 1:
             continue
         c = tables.observables[k]
-        size = size_of(functions, c, k, t, y, y, p, workspace)
-        side = side_ahead(functions, before, c, t, y, p, unit, size, workspace)
-        if side != 0 and side == side_ahead(functions, mode, c, t, y, p, unit, size, workspace):
-            found |= 1 << k
-    return found
+        if c != observed:  # surfaces of one observable stand together
+            observed = c
+            value = functions.observe(c, t, y, p, workspace.none, workspace.empty)
+        level = functions.level(k, p, workspace.none, workspace.empty)
+        beyond = (level - value) * side
+        if abs(beyond) <= _BEYOND * (1.0 + abs(level)):
+            size = size_of(functions, c, k, t, y, y, p, workspace)
+            if beyond < -_ON * size:
+                continue
+            if side_ahead(functions, mode, c, t, y, p, unit, size, workspace) == -side:
+                return kept, k
+            kept |= 1 << k
+    return kept, -1

@@ -19,6 +19,7 @@ from contfric.orbit.tables import (
     declared_surfaces,
     flight_table,
     moves_on,
+    side_of,
     sides_of,
     surfaces_under,
 )
@@ -78,10 +79,14 @@ class GrowingTables:
             self._write(mode.name)
         done, surfaces = len(self._rules), len(model.surfaces)
         bounds = np.zeros((done, surfaces), dtype=np.int64)
+        inside = np.zeros_like(bounds)
         counts = np.zeros(done * surfaces, dtype=np.int64)
         for k, rules in enumerate(self._rules):
             for surface, own in rules.items():
                 bounds[k, surface] = 1
+                inside[k, surface] = side_of(
+                    model, model.modes[k].name, model.surfaces[surface].name
+                )
                 counts[k * surfaces + surface] = len(own)
         written = [
             (*sides, self._number(to))
@@ -95,6 +100,7 @@ class GrowingTables:
                 [model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64
             ),
             bounds,
+            inside,
             np.concatenate([[0], np.cumsum(counts)]),
             np.array(written, dtype=np.int64).reshape(-1, 3),
             np.array(self._sliding, dtype=np.int64),

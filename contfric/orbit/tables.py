@@ -16,7 +16,7 @@ import numpy as np
 
 from contfric.errors import ModelError, ParameterError
 from contfric.models.composed import ComposedModel
-from contfric.models.definition import Mode, Model, Surface
+from contfric.models.definition import Domain, Mode, Model, Surface
 from contfric.models.parts import MOST_SURFACES
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
@@ -34,6 +34,7 @@ class Tables(NamedTuple):
     ----------
     observables : observable of each surface
     bounds : whether a surface bounds a mode, shape (modes, surfaces); 2 if it has a reset in that mode
+    inside : the side of a surface that a mode which it bounds lies on; 0 if it lies on it, or on both
     first : first rule of each (mode, surface), and the number of rules, shape (modes * surfaces + 1,)
     rules : rows (mask, value, mode that follows): the first that the sides of all surfaces fit, as bits
     sliding : whether a mode slides on a surface; 2 if it may do so for more than a period
@@ -51,6 +52,7 @@ class Tables(NamedTuple):
 
     observables: IntArray
     bounds: IntArray
+    inside: IntArray
     first: IntArray
     rules: IntArray
     sliding: IntArray
@@ -104,15 +106,18 @@ def tables(model: Model) -> Tables:
         )
     check_surfaces(model)
     bounds = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)
+    inside = np.zeros_like(bounds)
     for k, mode in enumerate(model.modes):
         for name in cut_bounds(model)[mode.name]:
             bounds[k, model.surface_index[name]] = (
                 1 if model.reset_at(mode.name, name) is None else MAPPED
             )
+            inside[k, model.surface_index[name]] = side_of(model, mode.name, name)
     first, rules = _rules(model)
     return Tables(
         np.array([model.observable_index[s.observable] for s in model.surfaces], dtype=np.int64),
         bounds,
+        inside,
         first,
         rules,
         np.array(
@@ -218,6 +223,21 @@ def surfaces_under(model: Model, mode: str) -> int:
         sides = model.domain_by_name[mode].signs
         return bits_of(model, (s for s, side in sides.items() if side == 0))
     return bits_of(model, _lies_on(model).get(mode, ()))
+
+
+def side_of(model: Model, mode: str, surface: str) -> int:
+    """Return the side of a surface that a mode lies on; 0 if it lies on it, or on both sides."""
+    own = (model.domain_by_name[mode],) if model.composed else _own_domains(model)[mode]
+    signs = {domain.signs.get(surface, 0) for domain in own}
+    return signs.pop() if len(signs) == 1 else 0
+
+
+@cache
+def _own_domains(model: Model) -> dict[str, list[Domain]]:
+    found: dict[str, list[Domain]] = {mode.name: [] for mode in model.modes}
+    for domain in model.domains:
+        found[domain.own_mode].append(domain)
+    return found
 
 
 @cache

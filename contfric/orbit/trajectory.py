@@ -18,7 +18,7 @@ from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, ve
 from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.models.parts import MOST_SURFACES
-from contfric.orbit.ahead import still_left
+from contfric.orbit.ahead import begun_on
 from contfric.orbit.resting import impacts_ahead, still_bounced
 from contfric.orbit.sides import flight_of, leads_to, mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
@@ -37,7 +37,8 @@ from contfric.orbit.walls import (
 
 #: Types of the model's tables and of the rows of events, as kernels take them.
 TablesType = types.NamedTuple(
-    [indices, table, indices, table, indices, indices, table, table, i8, table, indices], Tables
+    [indices, table, table, indices, table, indices, indices, table, table, i8, table, indices],
+    Tables,
 )
 RowsType = types.NamedTuple([table, indices, vector, matrix], EventRows)
 
@@ -73,10 +74,9 @@ _AHEAD = 1e-3
 #: Numbers that a simulation hands over to the call that goes on with it: whether there are any, the period
 #: and phase it began in, the period it is in, events at once, whether one was an impact, surfaces it is on,
 #: 1 + the wall that was met last if impacts go on alike since, how many impacts to come are known not to lead
-#: to rest, the unit of time of a model without excitation (1 if less), and of a segment of no length the
-#: surfaces that it began on and its mode.
+#: to rest, and the unit of time of a model without excitation (1 if less).
 STARTED, FIRST_CYCLE, FIRST_TIME, CYCLE, AT_ONCE, STRUCK, ON, BOUNCED, LEFT, UNIT = range(10)
-BEGUN_ON, BEFORE, CARRIED = 10, 11, 12
+CARRIED = 10
 
 #: A state this large grows for ever (negative damping, or resonance without any): its square is still
 #: far from overflow, and its events are still exact.
@@ -104,6 +104,16 @@ def first_hit(functions, tables, mode, on, t, y, p, longest, unit, workspace):  
             return tau, surface
         within *= _WIDER
     return hit_within(functions, tables, mode, on, t, y, p, longest, workspace)
+
+
+@helper
+def first_met(functions, tables, mode, on, t, y, p, longest, unit, workspace):  # type: ignore[no-untyped-def]
+    """Do the same where a mode begins, which may be on more surfaces than are known."""
+    kept, crossed = begun_on(functions, tables, mode, on, t, y, p, unit, workspace)
+    if crossed >= 0:
+        copy_state(y, workspace.after)
+        return 0.0, crossed
+    return first_hit(functions, tables, mode, on | kept, t, y, p, longest, unit, workspace)
 
 
 @helper
@@ -154,7 +164,7 @@ def begin(carry, on, t, period):  # type: ignore[no-untyped-def]
     cycle = int(math.floor(t / period)) if period > 0.0 else 0
     t -= cycle * period
     carry[STARTED], carry[FIRST_CYCLE], carry[FIRST_TIME] = 1.0, float(cycle), t
-    carry[AT_ONCE] = carry[STRUCK] = carry[BOUNCED] = carry[BEGUN_ON] = 0.0
+    carry[AT_ONCE] = carry[STRUCK] = carry[BOUNCED] = 0.0
     return cycle, t, on
 
 
@@ -293,13 +303,10 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
     for _ in range(budget):
         if event == rows.joints.shape[0]:
             break
-        if carry[BEGUN_ON] != 0.0:  # without time, what was left before is left still
-            before, begun_on = int(carry[BEFORE]), int(carry[BEGUN_ON])
-            on |= still_left(functions, tables, before, mode, begun_on, t, y, p, unit, workspace)
         left = time_left(carry, cycle, t, period, periods)
         allowance = (HOLD_PERIODS if tables.sliding[mode] == 1 else SLIDE_PERIODS) * unit
         stretch = min(left, allowance - waited, _STRETCH * unit)
-        tau, surface = first_hit(functions, tables, mode, on, t, y, p, stretch, unit, workspace)
+        tau, surface = first_met(functions, tables, mode, on, t, y, p, stretch, unit, workspace)
         if surface < 0:
             waited += stretch
             if left > stretch and not waited < allowance:
@@ -315,7 +322,6 @@ def follow(functions, tables, mode, on, t, y, p, periods, rows, carry, budget, w
                 continue
             return ALL_TIME, event, mode, cycle, t
         waited = 0.0
-        carry[BEGUN_ON], carry[BEFORE] = float(on) if tau <= NO_TIME * unit else 0.0, float(mode)
         if too_large(y):  # or, where flights were short, they are too short to be resolved
             chatters = carry[STRUCK] != 0.0 and carry[AT_ONCE] > 0.0
             return (CHATTER if chatters else INFINITE), event, mode, cycle, t
