@@ -153,13 +153,15 @@ def flight_table(model: Model, modes: int) -> IntArray:
 
 def _rules(model: Model) -> tuple[IntArray, IntArray]:
     """Return the rules of all (mode, surface), one after the other, and where each begins."""
-    found: dict[tuple[int, int], dict[tuple[int, int], int]] = {}
+    found: dict[tuple[int, int], tuple[dict[tuple[int, int], int], ...]] = {}
 
     def add(
         source: str, surface: str, signs: Mapping[str, int], skipped: Collection[str], to: str
     ) -> None:
         pair = model.mode_index[model.domain_by_name[source].own_mode], model.surface_index[surface]
-        where = found.setdefault(pair, {})
+        # a side 0 is not asked for: a mode on a surface that the state need not be on is the last resort
+        by_chance = any(sign == 0 and s not in skipped for s, sign in signs.items())
+        where = found.setdefault(pair, ({}, {}))[by_chance]
         where[sides_of(model, signs, skipped)] = model.mode_index[model.domain_by_name[to].own_mode]
 
     for (name, surface), target in model.transitions.items():
@@ -183,7 +185,7 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
     first, rules = [0], []
     for mode in range(len(model.modes)):
         for k in range(len(model.surfaces)):
-            rules += _merged(found.get((mode, k), {}))
+            rules += [rule for cases in found.get((mode, k), ()) for rule in _merged(cases)]
             first.append(len(rules))
     return np.array(first, dtype=np.int64), np.array(rules, dtype=np.int64).reshape(-1, 3)
 
@@ -191,7 +193,7 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
 def _merged(cases: Mapping[tuple[int, int], int]) -> list[Rule]:
     """Return rules for the same cases: two that differ in one side, and lead to one mode, are one.
 
-    The cases of a (mode, surface) are distinct, so that their order does not matter.
+    The cases are distinct, so that their order does not matter.
     """
     rules = dict(cases)
     bits = 0
