@@ -191,16 +191,15 @@ def resolved(expression: Any, signs: Mapping[Any, int], moving: Collection[Any])
     def side(x: Any) -> Any:
         if not x.free_symbols & moved:
             return Sign(x)
-        found, inner = ratio(x), min(x.atoms(Abs, Sign, Where), key=str, default=None)
-        if found != 0 or inner is None:
+        chosen = next((w for w in x.atoms(Where) if not w.args[0].free_symbols & moved), None)
+        if chosen is not None:
+            up, down = (side(x.xreplace({chosen: part})) for part in chosen.args[1:])
+            return 0 if 0 in (up, down) else Where(chosen.args[0], up, down)
+        kinks = [k for k in x.atoms(Abs, Sign, Where) if k.args[0].free_symbols & moved]
+        if (found := ratio(x)) != 0 or not kinks:
             return found
+        inner = min(kinks, key=str)
         up, down = (side(x.xreplace({inner: part})) for part in _either(inner))
-        if (
-            isinstance(inner, Where)
-            and not inner.args[0].free_symbols & moved
-            and 0 not in (up, down)
-        ):
-            return Where(inner.args[0], up, down)
         return up if up == down else 0
 
     swaps: dict[Any, Any] = {}

@@ -77,7 +77,7 @@ def stepped(e: Element, state: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 #: Cases with segments of no length, in both orders of the stops, and one without; 0 is one in which a mass
-#: that sticks keeps a velocity of rounding, while the element stands at its limit until the other is released.
+#: that sticks keeps a velocity of rounding, while the element is at its limit until the other is released.
 @pytest.mark.parametrize("seed", [0, 1, 3, 7, 9])
 def test_of_an_element_between_two_masses_on_friction(seed: int) -> None:
     """Where both masses rest, the element does: three surfaces are met in one place, in any order."""
