@@ -148,7 +148,7 @@ def _comes_closer(
     across may end on the other curve, and what is between its ends belongs to neither. And whether a branch
     ends at a limit may be ``undecided``.
     """
-    fails = undecided or any(p.lost or p.rough or not event.located for event, p in located)
+    fails = undecided or any(point.lost or point.rough for _, point in located)
     if not fails or step < NEAREST:
         return False
     side.drop_tip()
