@@ -192,18 +192,19 @@ def begun(  # type: ignore[no-untyped-def]
     if timeless:
         period = ticks if ticks > 0.0 else 1.0  # periods of the clock, or units of time
     mode, on = start_mode(functions, tables, starting, time, y, p, state)
-    if mode >= 0:
-        start = mode, on, time - math.floor(time / period) * period, period
-        begin(solutions, k, cell, start, y, p, limits, workspaces)
-        return True
     ranks, cycle = starting.ranks, workspaces.cycle
     for j in range(y.shape[0]):
         transit.y[j] = y[j]
-    if not (
-        timeless and starts_at_rest(functions, tables, ranks, time, p, transit, cycle, rows, cell)
+    if timeless and starts_at_rest(
+        functions, tables, ranks, mode, time, p, transit, cycle, rows, cell
     ):
+        return False
+    if mode < 0:
         write_nothing(NO_MOTION, rows, cell)
-    return False
+        return False
+    start = mode, on, time - math.floor(time / period) * period, period
+    begin(solutions, k, cell, start, y, p, limits, workspaces)
+    return True
 
 
 @helper

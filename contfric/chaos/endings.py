@@ -171,11 +171,15 @@ def speed(functions, mode, t, p, transit, rows):  # type: ignore[no-untyped-def]
 
 
 @helper
-def starts_at_rest(functions, tables, ranks, t, p, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
-    """Write the exponents of an equilibrium that a solution starts on; tell whether it is one."""
-    for mode in range(ranks.shape[0]):
-        if tables.sliding[mode] == 0 and speed(functions, mode, t, p, transit, rows) == 0.0:
-            write_equilibrium(functions, tables, ranks, mode, t, p, transit, cycle, rows, cell)
+def starts_at_rest(functions, tables, ranks, mode, t, p, transit, cycle, rows, cell):  # type: ignore[no-untyped-def]
+    """Write the exponents of an equilibrium that a solution starts on; tell whether it is one.
+
+    In a mode, or in any where none is known (-1): on a surface that nothing leaves. What slides is held.
+    """
+    for k in range(ranks.shape[0]):
+        own = tables.sliding[k] == 0 and mode in (k, -1)
+        if own and speed(functions, k, t, p, transit, rows) == 0.0:
+            write_equilibrium(functions, tables, ranks, k, t, p, transit, cycle, rows, cell)
             rows.motions[cell] = AT_REST  # even if it repels
             return True
     return False
