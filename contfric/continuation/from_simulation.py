@@ -19,7 +19,7 @@ from contfric.orbit.conserved import conserved
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import is_smooth, without_sections
-from contfric.orbit.simulation import Trajectory, run
+from contfric.orbit.simulation import SimulationEnd, Trajectory, run
 from contfric.orbit.slides import resting_modes
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
@@ -37,6 +37,9 @@ _PLACES = np.array([0.17, 0.26, 0.37, 0.44, 0.52, 0.61, 0.70, 0.79])
 #: Turns after which a solution that creeps is periodic but for that: what it rings with decays like
 #: exp(-2 pi zeta) a turn, with a damping ratio of 0.02 to 1e-5.
 _CREEPS = 100
+#: Events in one turn, and in those: far more than any orbit has, which are tens a turn. One that has more is
+#: left out.
+_EVENTS, _CREEPING_EVENTS = 10_000, 100_000
 #: What an orbit changes by less than this (relative to 1 + its size) it conserves: at an event slips of no
 #: length are located to rounding or its root.
 _KEPT = 1e-6
@@ -117,7 +120,7 @@ def _one_turn(
     model, (i, time) = orbit.model, start
     mode = model.mode_index[_declared(orbit, i, time, state)]
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
-    trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, 10_000)
+    trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, _EVENTS)
     stop = _end_of_turn(orbit, trajectory, start, unit)
     if stop is None:
         return None
@@ -150,7 +153,9 @@ def _without_creep(
         return None
     mode = model.mode_index[_declared(orbit, *start, state)]
     turns = _CREEPS * orbit.periods
-    trajectory = run(model, found.vector, mode, 0, start[1], state, turns, 100_000)
+    trajectory = run(model, found.vector, mode, 0, start[1], state, turns, _CREEPING_EVENTS)
+    if trajectory.end not in (SimulationEnd.TIME, SimulationEnd.HELD):
+        return None
     data = conserved(model, tuple(pair for pair in found.itinerary if pair[0] not in modes))
     last = trajectory.last[2]
     return _one_turn(orbit, start, found.vector, last + data.T @ (data @ (state - last)))
