@@ -61,14 +61,20 @@ def watch_calls(calls: dict[str, int]) -> None:
     """Count the calls of each kernel from Python."""
     from contfric.compiled import Kernel
 
-    original = Kernel.__call__
+    find = Kernel.entry.func
 
-    def call(self: Any, *arguments: Any) -> Any:
-        name = self.__wrapped__.__name__
-        calls[name] = calls.get(name, 0) + 1
-        return original(self, *arguments)
+    def counted(self: Any) -> Any:
+        entry, name = find(self), self.__wrapped__.__name__
 
-    Kernel.__call__ = call  # type: ignore[method-assign]
+        def call(*arguments: Any) -> Any:
+            calls[name] = calls.get(name, 0) + 1
+            return entry(*arguments)
+
+        return call
+
+    watched = cached_property(counted)
+    watched.__set_name__(Kernel, "entry")
+    Kernel.entry = watched  # type: ignore[method-assign, assignment]
 
 
 def imported(study: str) -> dict[str, float]:
@@ -100,7 +106,8 @@ def main(study: str, folder: str) -> dict[str, Any]:
     watch_calls(calls)
     from contfric.cli import main as command_line
 
-    command_line(["run", study, "--out", folder, "--force", "--quiet"])
+    if failed := command_line(["run", study, "--out", folder, "--force", "--quiet"]):
+        raise SystemExit(failed)  # run.json may be there, from a run before
     inside = time.perf_counter() - start
     record = json.loads((Path(folder) / "run.json").read_text(encoding="utf-8"))
     return {
