@@ -68,7 +68,6 @@ def leave_along(
     orbit: Orbit, settings: Settings, direction: Direction, reason: str, distance: float = LEAVE
 ) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
-    origin = first_point(orbit, settings)
     active = orbit.model.index_of(settings.parameter)
     moved = displaced(orbit, active, distance * direction.joints, distance * direction.slope)
     point = first_point(moved, settings, direction.joints, direction.slope)
@@ -78,9 +77,8 @@ def leave_along(
     away = Direction(point.joints - orbit.joints, point.value - settings_value(orbit, settings))
     if away.cosine(point.tangent, point.slope, settings.scale) < 0.0:
         point = point.reversed()
-    if origin is None:
-        origin = replace(point)
-    origin.joints, origin.w = orbit.joints, np.array([settings_value(orbit, settings)])
+    at = np.array([settings_value(orbit, settings)])
+    origin = replace(point, joints=orbit.joints, w=at, arc=0.0)  # no solve where it is singular
     point.arc = distance
     return BranchStart(orbit, point, origin, reason)
 

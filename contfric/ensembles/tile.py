@@ -139,6 +139,8 @@ def _diagram(tile: EnsembleTile, vector: FloatArray) -> Diagram | ContfricError:
         diagram = explore(start, tile.parameter, tile.range, **tile.options)
     except ConvergenceError as error:
         return error
+    except Exception as error:  # a fault of ours costs its sample only, and is counted
+        return ContfricError(f"internal error, {type(error).__name__}: {error} (please report it)")
     reasons = {end.reason for branch in diagram.branches for end in branch.ends}
     if EndReason.INTERRUPTED.value in diagram.notes or EndReason.INTERRUPTED in reasons:
         raise KeyboardInterrupt

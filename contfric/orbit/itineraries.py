@@ -87,7 +87,7 @@ def _shortest_walk(model: Model, start: str, end: str) -> list[str]:
 
 
 def decode(code: int, surfaces: list[str]) -> list[str]:
-    """Return the surfaces crossed, in order, from the digits of a label."""
+    """Return the surfaces crossed, in order, from the digits of a label; none if they are too many."""
     base = len(surfaces) + 1
     crossed: list[str] = []
     while code > 0:
@@ -115,5 +115,7 @@ def mirrored_labels(labels: IntArray, model: Model) -> IntArray:
 @cache
 def _mirrored_code(code: int, model: Model) -> int:
     assert model.symmetry is not None
+    if code < 0:  # more crossings than a label lists
+        return code
     image, surfaces = model.symmetry.surfaces, [s.name for s in model.surfaces]
     return encode([image[s] for s in decode(code, surfaces)], surfaces)

@@ -16,15 +16,12 @@ from contfric.compiled import helper, indices, kernel, matrix, vector
 from contfric.compiling.references import by_reference
 from contfric.flow.layouts import FlowType
 from contfric.orbit.after_reset import apply_reset
+from contfric.orbit.crossed import TOUCH
 from contfric.orbit.equations import LayoutType, close_chain, equation_workspace, segment_rows
 from contfric.orbit.followed import followed_values, keep_end, keep_levels, keep_values
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN
 from contfric.orbit.newton import CHECKS
 from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
-
-#: An observable this near to a level, relative to 1 + the level, touches it to rounding (ten units in
-#: the last place): it is not labelled as a crossing.
-_TOUCH = 2e-15
 
 #: Within this share of 1 + the duration from a joint that is pinned (a hold starts or ends there) a
 #: stationary point is the joint itself: what it misses is the square of it, 1e-12.
@@ -37,6 +34,10 @@ _SAME_HEIGHT = 1e-13
 _SOON = 0.03
 #: In the place of a label that is not known yet.
 _NO_LABEL = -2
+#: Largest label to which a digit is added; it has 62 bits, so that no sum of a digit leaves 64.
+_LONGEST = 2**62
+#: A label of more crossings than fit is negative and lists none: it only tells one sequence from another.
+_TOO_MANY = -3
 #: Duration below which rounding hides what is left of a margin without its double zero: at this one it is
 #: known to 1e-3, and a curvature of the load is larger.
 _CLEAR = 1e-6
@@ -265,7 +266,7 @@ def ends_of(functions, layout, k, z, p, workspace):  # type: ignore[no-untyped-d
 @helper
 def side_of(value, target):  # type: ignore[no-untyped-def]
     """Return 2 above a level, 1 below it, 0 where rounding cannot tell."""
-    slack = _TOUCH * (1.0 + abs(target))
+    slack = TOUCH * (1.0 + abs(target))
     return 2 if value > target + slack else (1 if value < target - slack else 0)
 
 
@@ -288,6 +289,14 @@ def crossings(functions, layout, k, z, p, workspace, stationary):  # type: ignor
     found = points_of_label(functions, layout, k, z, p, workspace, stationary)
     code, nearest, final = crossed(functions, layout, k, found, z, p, workspace, stationary)
     return code, nearest, found, final
+
+
+@helper
+def longer(code, base, digit):  # type: ignore[no-untyped-def]
+    """Return a label with one crossing more; of too many, a negative number that differs with each."""
+    if 0 <= code <= (_LONGEST - digit) // base:
+        return code * base + digit
+    return _TOO_MANY - ((abs(code) % _LONGEST * base + digit) % _LONGEST)
 
 
 @helper
@@ -318,7 +327,7 @@ def crossed(functions, layout, k, found, z, p, workspace, stationary):  # type: 
                 continue
             sides ^= (side ^ before) << (2 * surface)
             if before != 0:
-                code = code * (surfaces + 1) + surface + 1
+                code = longer(code, surfaces + 1, surface + 1)
         value = following
     return code, nearest, final
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from contfric.models.definition import Domain, FloatArray, Model
+from contfric.orbit.crossed import crossed_by
 from contfric.orbit.itineraries import decode, end_domain, passed_domains
 from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
@@ -65,7 +66,7 @@ def _paths(orbit: Orbit, labels: IntArray) -> list[list[str]]:
     ends, itinerary = _end_domains(orbit), orbit.itinerary
     crossed: list[list[str]] = [[] for _ in system.itinerary]
     for row, code in zip(system.layout.labels, labels, strict=True):
-        crossed[row[0]] += decode(int(code), surfaces)
+        crossed[row[0]] += decode(int(code), surfaces) if code >= 0 else crossed_by(orbit, *row[:2])
     return [
         [ends[i]]
         if is_hold(itinerary[i][1])

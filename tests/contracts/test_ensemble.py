@@ -255,6 +255,22 @@ def test_samples_that_fail_and_limits_are_counted() -> None:
     assert found.classes == () and "S0" in found.rows.reasons[found.samples[:, 0] > 0.4][0]
 
 
+def test_a_fault_costs_its_sample_only(found: cf.Ensemble, monkeypatch: pytest.MonkeyPatch) -> None:
+    from contfric.ensembles import tile
+
+    explore, calls = tile.explore, iter(range(len(found)))
+
+    def sometimes(*what: Any, **options: Any) -> cf.Diagram:
+        if next(calls) == 3:
+            raise OverflowError("too large")
+        return explore(*what, **options)
+
+    monkeypatch.setattr(tile, "explore", sometimes)
+    hurt = compute()
+    assert hurt.counts() == {"complete": len(found) - 1, "failed": 1}
+    assert hurt.rows.reasons[3].startswith("internal error, OverflowError: too large")
+
+
 # ----------------------------------------------------------------------------------- results
 
 
