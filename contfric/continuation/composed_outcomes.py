@@ -26,8 +26,8 @@ from contfric.continuation.shared_outcomes import in_other_order, limit_after, w
 from contfric.continuation.touching import coming_back, second_rate
 from contfric.continuation.zero_acceleration import only_comes_back, touch_of
 from contfric.errors import NotationError
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
+from contfric.models.structure_model import ComposedModel
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.edits import Edit, split, swap_edit

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.errors import NotationError
-from contfric.models.composed import ComposedModel
+from contfric.models.structure_model import ComposedModel
 from contfric.orbit.system import Itinerary
 from contfric.signature.edits import Edit
 
