@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from contfric.atlas.collect import Event
-from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
@@ -27,6 +26,7 @@ from contfric.atlas.leaving_event import (
     may_have_passed,
     settings_for,
 )
+from contfric.atlas.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
 from contfric.atlas.short_branches import follow_short
 from contfric.atlas.splitting import follow_split

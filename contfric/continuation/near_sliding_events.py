@@ -12,7 +12,7 @@ parameter's distance to the event: its slope vanishes at the event with d itself
 what is rounding.
 
 What is so near to a sliding event that the parameter does not tell it from that belongs to it
-(:func:`contfric.continuation.locate.belongs_to`). So nothing is lost if signs are taken where that begins:
+(:func:`contfric.continuation.resolve.belongs_to`). So nothing is lost if signs are taken where that begins:
 there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 1e-6 for c of order 1.
 """
 

@@ -21,7 +21,7 @@ from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertex_between import left_at
+from contfric.continuation.vertex_ends import left_at
 from contfric.continuation.vertices import passed_vertex
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
