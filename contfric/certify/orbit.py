@@ -52,8 +52,6 @@ _BITS = (128, 256, 512)
 _WIDE = 5
 #: Bits of the working precision that rounding of a chain may take: condition numbers to 1e9.
 _SPARE = 30
-#: Least share of the box that is tried where the Jacobian changes too much over it.
-_SMALLEST = 16
 _FAMILY = "it is one of a family of orbits, and it is not known exactly what a contact keeps"
 
 
