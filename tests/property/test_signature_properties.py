@@ -146,5 +146,5 @@ def test_swapping_a_stop_twice_changes_nothing(signature: Signature) -> None:
             continue  # the slide cannot reverse into the direction in which the stick is left
         # the stick at the seam was itinerary[0]: its removal moves the joint
         moved = joint - 1 if joint == len(itinerary) - 1 else joint
-        back = swap_stop(swapped, moved, following[1], COULOMB)
+        back = swap_stops(swapped, {moved: following[1]}, COULOMB)
         assert canonical_itinerary(back, COULOMB) == itinerary
