@@ -60,7 +60,7 @@ def _follow_through(
     orbit, settings = crossing.orbit, state.settings
     reason = "the branch that goes on through the event"
     for way in (direction, direction.reversed()):
-        start = leave_along(orbit, settings, way, EndReason.BP.value)
+        start = leave_along(orbit, settings, way)
         if start is None or not settings.low <= start.point.value <= settings.high:
             continue
         active = orbit.model.index_of(settings.parameter)

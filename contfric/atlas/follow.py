@@ -169,9 +169,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
-        if state.take(event, reason, branch):
-            for end in ends:
-                state.merge(event, end)
+        state.take(event, reason, branch, ends)
     for itinerary in (w for w in refused if w not in done):
         state.judge(event, reason, Decision.REFUSED, why=refused[itinerary])
     # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere,
@@ -268,9 +266,8 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         return False
     branch, ends = _located_by(state, branch, event)
     branch = from_admissible(branch, candidate.orbit) if not ends else branch
-    state.accept(event, candidate.reason, branch)
+    state.accept(event, candidate.reason, branch, ends)
     for end in ends:
-        state.merge(event, end)
         event.take_better(end)
     return True
 
