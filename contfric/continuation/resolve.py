@@ -136,7 +136,7 @@ def _is_known(
         return True
     if bifurcation.kind is not Kind.T:
         return False
-    if _is_start(side, before, point):
+    if side.count == 2 and point.arc - before.arc < SAME_LOCATION:
         side.relabel_first(after.labels)  # where a stop lies on a surface its label is arbitrary
         return True
     return is_known_touch(side, point)
@@ -157,11 +157,6 @@ def _comes_closer(
     side.drop_tip()
     side.largest = step / SHORTER
     return True
-
-
-def _is_start(side: Side, before: Point, point: Point) -> bool:
-    """Tell whether a change of labels happens at the very start of a side, at an event."""
-    return side.count == 2 and point.arc - before.arc < SAME_LOCATION
 
 
 def locate_events(
