@@ -45,17 +45,9 @@ _COLUMN, _TICKS = 4.5, 5
 
 
 def plot_branches(
-    branches: Sequence[Branch],
-    row: QuantityLike = "x_max",
-    ax: Axes | None = None,
-    *,
-    events: bool = True,
-    legend: bool = True,
-    names: Mapping[str, str] | None = None,
-    colours: Mapping[str, str] | None = None,
-    linestyles: Mapping[str, LineStyle] | None = None,
+    branches: Sequence[Branch], row: QuantityLike = "x_max", ax: Axes | None = None
 ) -> Axes:
-    r"""Draw one quantity of some branches against their parameter.
+    r"""Draw one quantity of some branches against their parameter, with their bifurcations.
 
     Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation. Bridges,
     whose orbits have holds, are finely dotted and grey.
@@ -66,17 +58,8 @@ def plot_branches(
     row : str or callable
         The quantity, as for :meth:`contfric.Branch.quantity`.
     ax : Axes, optional
-        Where to draw; new axes by default.
-    events : bool
-        Whether to mark and label the branches' bifurcations.
-    legend : bool
-        Whether to draw the legend: next to new axes, or inside yours, there without the meaning of
-        the markers.
-    names, colours : mapping, optional
-        What branches are called in the legend, and colours of theirs, by their names.
-    linestyles : mapping, optional
-        Line styles of matplotlib for ``"stable"``, ``"unstable"``, ``"unknown"`` (no multipliers) and
-        ``"bridge"``.
+        Where to draw; new axes by default. The legend stands next to these, or inside yours, there without
+        the meaning of the markers.
 
     Examples
     --------
@@ -87,8 +70,8 @@ def plot_branches(
     '$\\psi$'
     """
     row_of(row, model_of(branches))  # before a figure is opened for it
-    found = [b for branch in branches for b in branch.bifurcations] if events else []
-    look = Look.of(branches, names, colours, linestyles, legend=legend)
+    found = [b for branch in branches for b in branch.bifurcations]
+    look = Look.of(branches, None, None, legend=True)
     return _plot_row(axes_or_new(ax), branches, found, row, look, outside=ax is None)
 
 
