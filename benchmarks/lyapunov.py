@@ -25,7 +25,9 @@ from origin import origin, renewed
 
 import contfric as cf
 from contfric.chaos.rows import FollowingLimits, follow
-from contfric.chaos.two_orbits import two_orbit_estimate
+
+sys.path.append(str(Path(__file__).parents[1]))
+from tests.two_orbits import two_orbit_estimate
 
 PAGE = Path(__file__).parents[1] / "docs" / "lyapunov.md"
 BEGIN, END = "<!-- begin of benchmarks/lyapunov.py -->", "<!-- end of benchmarks/lyapunov.py -->"

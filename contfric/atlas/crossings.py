@@ -4,20 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import settings_for
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
-from contfric.continuation.crossing_ends import starts_along
 from contfric.continuation.events import Decision, EndReason
 from contfric.continuation.points import Settings
 from contfric.continuation.switching import leave_along
 from contfric.continuation.trace import follow_orbit
+from contfric.models.definition import FloatArray
+from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 
 Depart = Callable[[Exploration, Orbit, Event, EndReason, Direction], None]
+#: Cosine above which two directions are the same.
+_ALONG = 0.9
+#: Joints that agree to this are those of the same motion: ends of branches at a branch point are located.
+_SAME = 1e-6
 
 
 def follow_crossing(state: Exploration, crossing: Crossing, event: Event, depart: Depart) -> None:
@@ -53,7 +60,7 @@ def _follow_through(
     orbit, settings = crossing.orbit, state.settings
     reason = "the branch that goes on through the event"
     for way in (direction, direction.reversed()):
-        start = leave_along(orbit, settings, way, EndReason.BP.value)
+        start = leave_along(orbit, settings, way)
         if start is None or not settings.low <= start.point.value <= settings.high:
             continue
         active = orbit.model.index_of(settings.parameter)
@@ -69,3 +76,51 @@ def _follow_through(
 def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
     """Return the branch of an orbit, both ways."""
     return follow_orbit(orbit, settings_for(orbit, settings))
+
+
+def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale: float) -> bool:
+    """Tell whether a branch has an end at a branch point and leaves it in a direction."""
+    orbit = crossing.orbit
+    if len(branch) < 2 or branch.system.half != orbit.system.half:
+        return False
+    for tip, inner in ((0, 1), (-1, -2)):
+        end = _aligned(branch, tip, tip, orbit)
+        near = _aligned(branch, inner, tip, orbit)
+        if end is None or near is None or np.abs(end - orbit.joints).max() > _SAME:
+            continue
+        slope = float(branch.values[inner] - branch.values[tip])
+        if direction.cosine(near - end, slope, scale) > _ALONG:
+            return True
+    return False
+
+
+def _aligned(branch: Branch, k: int, reference: int, orbit: Orbit) -> FloatArray | None:
+    """Return the joints of a point, turned so that those of another one are next to an orbit's.
+
+    A branch may begin with another segment of the same solution, and in another period.
+    """
+    itinerary, wanted = branch.system.itinerary, orbit.system.itinerary
+    if len(itinerary) != len(wanted) or branch.system.half:
+        return branch.joints[k] if itinerary == wanted else None
+    best: tuple[float, FloatArray] | None = None
+    for first in range(len(itinerary)):
+        if itinerary[first:] + itinerary[:first] != wanted:
+            continue
+        turned = [_turned(branch[i], first) for i in (reference, k)]
+        shift = 0.0
+        if not orbit.model.autonomous:
+            unit = orbit.period / orbit.periods
+            shift = unit * round(float(turned[0][0, 0] - orbit.joints[0, 0]) / unit)
+        for joints in turned:
+            joints[:, 0] -= shift
+        gap = float(np.abs(turned[0] - orbit.joints).max())
+        if best is None or gap < best[0]:
+            best = gap, turned[1]
+    return None if best is None else best[1]
+
+
+def _turned(orbit: Orbit, first: int) -> FloatArray:
+    """Return the joints of an orbit from another segment on."""
+    joints = np.roll(orbit.joints, -first, axis=0)
+    joints[len(joints) - first :, 0] += orbit.period
+    return clocked(orbit.model, joints, float(joints[0, 0]) + orbit.period)

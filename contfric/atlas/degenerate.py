@@ -49,7 +49,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
             location = f"{branch.name} at {branch.values[0]:.10g}"
             yield f"{location}: {parameter} changes by less along it than its ends are known to"
     for b in values:
-        if b.kind in _SMOOTH and _least_margin(b) < _SECOND:
+        if b.kind in _SMOOTH and float(np.min(b.orbit.margins, initial=np.inf)) < _SECOND:
             yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
 
 
@@ -80,7 +80,3 @@ def unresolved(branch: Branch, width: float) -> bool:
     ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
     known = sum(b.accuracy for b in ends) * width
     return len(ends) == 2 and bool(np.ptp(branch.values) < known)
-
-
-def _least_margin(event: Bifurcation) -> float:
-    return float(np.min(event.orbit.margins, initial=np.inf))

@@ -44,7 +44,7 @@ def follow_departure(
     text = "the branch that leaves along the null vector"
     if direction is None and leave_short(state, orbit, event, reason, text):
         return
-    for departure, distance, known in _departures(orbit, settings, reason, direction, state.known):
+    for departure, distance, known in _departures(orbit, settings, direction, state.known):
         if known is not None:
             state.judge(event, text, Decision.KNOWN, known)
             return
@@ -65,7 +65,6 @@ def follow_departure(
 def _departures(
     orbit: Orbit,
     settings: Settings,
-    reason: EndReason,
     direction: Direction | None,
     known: Callable[[Orbit], int | None],
 ) -> Iterator[tuple[BranchStart, float, int | None]]:
@@ -74,7 +73,7 @@ def _departures(
     along = direction or null_direction(orbit)
     overshot: list[float] = []
     for distance in chain(NEARER, overshot):  # those that overshoot something come last
-        departure = leave_along(orbit, settings, along, reason.value, distance)
+        departure = leave_along(orbit, settings, along, distance)
         if departure is None or violates(departure.point):
             continue  # nothing is there, or a condition has been violated on the way
         there = departure.point.orbit(orbit, active)
@@ -140,13 +139,13 @@ def _begin(state: Exploration, event: Event) -> None:
         return
     kind, orbit = event.bifurcation.kind, event.bifurcation.orbit
     if kind is Kind.PD and 2 * orbit.periods <= state.max_periods:
-        orbit, reason = orbit.doubled(), EndReason.PD
+        orbit = orbit.doubled()
     elif kind is Kind.BP and orbit.system.half:
-        orbit, reason = orbit.as_whole(), EndReason.BP
+        orbit = orbit.as_whole()
     else:
         return
     settings = settings_for(orbit, state.settings)
-    for departure, distance, known in _departures(orbit, settings, reason, None, state.known):
+    for departure, distance, known in _departures(orbit, settings, None, state.known):
         if known is None:
             trace_side(orbit, departure.point, settings, first_step=_first_step(distance, settings))
         return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from contfric.atlas.collect import Event
@@ -84,14 +84,16 @@ class Exploration:
         for bifurcation in branch.bifurcations:
             self._meet(bifurcation, index)
 
-    def accept(self, event: Event, reason: str, branch: Branch) -> None:
-        """Register a branch that starts at an event, and why it was tried."""
+    def accept(self, event: Event, reason: str, branch: Branch, ends: Iterable[End] = ()) -> None:
+        """Register a branch that starts at an event, and why it was tried; ``ends`` of it are there, too."""
         index = len(self.branches)
         with held_back():
             self.judge(event, reason, Decision.ACCEPTED, index)
             self._register(branch)
             if index not in event.branches:
                 event.branches.append(index)
+        for end in ends:
+            self.merge(event, end)
 
     def raise_copies(self, copies: int) -> None:
         """Try more copies at events from now on, those that were followed already among them."""
@@ -206,11 +208,11 @@ class Exploration:
             self.judge(event, reason, Decision.KNOWN, known)
         return known is not None
 
-    def take(self, event: Event, reason: str, branch: Branch) -> bool:
+    def take(self, event: Event, reason: str, branch: Branch, ends: Iterable[End] = ()) -> bool:
         """Register a branch that meets an event, if it is not known; whether it is new."""
         if self.knows(event, reason, inner_orbit(branch)):
             return False
-        self.accept(event, reason, branch)
+        self.accept(event, reason, branch, ends)
         return True
 
     def ends_here(self, orbit: Orbit, event: Event) -> int | None:

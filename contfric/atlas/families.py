@@ -47,9 +47,7 @@ def follow_family_at(state: Exploration, event: Event, orbit: Orbit, reason: str
     ends = [end for end in branch.ends if meets(end, event, state.settings, kinds)]
     if not ends:
         return False
-    state.accept(event, reason, branch)
-    for end in ends:
-        state.merge(event, end)
+    state.accept(event, reason, branch, ends)
     return True
 
 
@@ -75,9 +73,7 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
             branch = whole_branch(shortest(near), state.settings)
             ends = [end for end in branch.ends if meets(end, event, state.settings)]
             if ends and not fault_of(branch, state.settings.width):
-                state.accept(event, candidate.reason, branch)
-                for end in ends:
-                    state.merge(event, end)
+                state.accept(event, candidate.reason, branch, ends)
 
 
 def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:

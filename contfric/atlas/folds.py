@@ -23,7 +23,7 @@ from contfric.continuation.events import Decision, EndReason, Kind
 from contfric.continuation.points import Point
 from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.continuation.side import first_point
-from contfric.continuation.switching import NEARER, settings_value
+from contfric.continuation.switching import NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertices import symmetrised
 from contfric.models.definition import FloatArray
@@ -169,11 +169,7 @@ def _add_one_sided(
 ) -> None:
     """Trace a family away from its orbit at a fold, from a point next to it."""
     settings = settings_for(orbit, state.settings)
-    if float(np.sum((point.joints - orbit.joints) * point.tangent)) < 0.0:
-        point = point.reversed()
-    value = np.array([settings_value(orbit, settings)])
-    origin = replace(point, joints=orbit.joints, w=value, arc=0.0)
-    point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
+    point, origin = start_beside(orbit, point, settings, point.joints - orbit.joints)
     side = trace_side(orbit, point, settings, progress=state.progress)
     first = first_end(EndReason.BP, event, side, settings)
     state.accept(event, reason, assemble(orbit, settings, side, first, origin))

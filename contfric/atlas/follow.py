@@ -13,7 +13,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from contfric.atlas.collect import Event
-from contfric.atlas.composed import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
@@ -27,6 +26,7 @@ from contfric.atlas.leaving_event import (
     may_have_passed,
     settings_for,
 )
+from contfric.atlas.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
 from contfric.atlas.short_branches import follow_short
 from contfric.atlas.splitting import follow_split
@@ -169,9 +169,7 @@ def _follow_flow(state: Exploration, event: Event) -> None:
             refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
             continue
         done.add(itinerary)
-        if state.take(event, reason, branch):
-            for end in ends:
-                state.merge(event, end)
+        state.take(event, reason, branch, ends)
     for itinerary in (w for w in refused if w not in done):
         state.judge(event, reason, Decision.REFUSED, why=refused[itinerary])
     # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere,
@@ -268,9 +266,8 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         return False
     branch, ends = _located_by(state, branch, event)
     branch = from_admissible(branch, candidate.orbit) if not ends else branch
-    state.accept(event, candidate.reason, branch)
+    state.accept(event, candidate.reason, branch, ends)
     for end in ends:
-        state.merge(event, end)
         event.take_better(end)
     return True
 

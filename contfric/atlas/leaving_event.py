@@ -19,7 +19,7 @@ from contfric.continuation.candidates import Candidate, directions
 from contfric.continuation.events import ACCURACY, Bifurcation, End, EndReason
 from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.side import Side, first_point
-from contfric.continuation.switching import LEAVE, NEARER, settings_value
+from contfric.continuation.switching import LEAVE, NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.models.definition import FloatArray
 from contfric.orbit.linear import null_space
@@ -166,15 +166,9 @@ def _leave_beside(
             there = point.orbit(orbit, active)
             if not _is_beside(there, moved, orbit):
                 continue
-            if float(np.sum(away * point.tangent)) < 0.0:
-                point = point.reversed()
-            point.arc = float(np.linalg.norm(there.joints - orbit.joints)) / len(away) ** 0.5
+            point, origin = start_beside(orbit, point, settings, away)
             side = _trace(there, point, settings, _NEAR_EVENT[0], state.progress)
             if there.admissible and side.count > 1:
-                origin = altered(
-                    point, joints=orbit.joints, w=np.array([settings_value(orbit, settings)])
-                )
-                origin.arc = 0.0
                 _end_where_it_began(side, origin, event, settings)
                 first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first, origin)

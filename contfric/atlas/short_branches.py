@@ -148,8 +148,7 @@ def follow_short(state: Exploration, candidate: Candidate, event: Event) -> bool
     if (known := _known(state, short)) is not None:
         state.judge(event, candidate.reason, Decision.KNOWN, known)
         return event.branches[:1] != [known]
-    state.accept(event, candidate.reason, short)
-    state.merge(event, short.ends[1])
+    state.accept(event, candidate.reason, short, short.ends[1:])
     event.take_better(short.ends[1])
     return True
 

@@ -9,6 +9,7 @@ what follows from that for completeness, and what does not.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +18,6 @@ from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.conditions import ClosedItinerary, Fate, fates_before
 from contfric.censuses.grid import CensusLimits, Grid
 from contfric.censuses.itineraries import canonical_pair, closed_itineraries
-from contfric.censuses.limits import NEAR_ENOUGH, limits_of
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import Census, SectionSearch
 from contfric.censuses.search import Progress, Search, searched
@@ -28,6 +28,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
 from contfric.orbit.itineraries import whole_of
 from contfric.signature import ReducedItinerary
+from contfric.signature.edits import show
 
 #: Cells of a curve: 4096 a period at first (0.02 s for ten events); where itineraries differ
 #: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.
@@ -45,6 +46,8 @@ _FINEST = 3
 _NATURAL, _FACTOR = 8.0, 8.0
 #: The box is doubled at most this often.
 _DOUBLINGS = 3
+#: Orbits within this share of a box leave space for others outside of those found.
+NEAR_ENOUGH = 0.75
 
 
 def census(
@@ -229,3 +232,60 @@ class _Census:
         elif fate is None:
             fate = Fate.NOT_CLOSED if itinerary in self.followed else Fate.NOT_WALKED
         return ClosedItinerary(itinerary, periods, fate, found)
+
+
+def limits_of(
+    limits: CensusLimits,
+    searches: Sequence[SectionSearch],
+    catalogue: Catalogue,
+    interrupted: bool,
+) -> tuple[str, ...]:
+    """Return one line for each thing that bounds a census."""
+    lines = [f"asked for: up to {limits.periods} period(s) and {limits.stops} stop(s)"]
+    for search in searches:
+        lines += [f"{search.section}: {text}" for text in _of_section(search, limits)]
+    for itinerary, periods in sorted(catalogue.continua):
+        lines.append(
+            f"{show(itinerary)} over {periods} period(s): a multiplier is 1; of what may be a continuum of "
+            "orbits one is listed"
+        )
+    if interrupted:
+        lines.append("interrupted: what is listed was found until then")
+    return tuple(lines)
+
+
+def _of_section(search: SectionSearch, limits: CensusLimits) -> list[str]:
+    lines = [_resolution(search)]
+    if search.cut:
+        lines.append(
+            f"{search.cut} of {search.starts} starts make more than {limits.stops} stops in "
+            f"{limits.periods} period(s): orbits with more stops may exist"
+        )
+    else:
+        lines.append(f"no start makes more than {limits.stops} stops in {limits.periods} period(s)")
+    if search.held:
+        lines.append(f"{search.held} of {search.starts} starts come to rest for ever")
+    if search.farthest > NEAR_ENOUGH * search.reach:
+        lines.append(
+            f"an orbit lies at {search.farthest:.3g}, near the edge of the box of half-width "
+            f"{search.reach:.3g}: others may lie outside"
+        )
+    if search.open:
+        lines.append(
+            f"at {search.open} place(s) a return nearly closes and Newton finds no orbit: a fold, or "
+            "an orbit at an event, to rounding"
+        )
+    if not search.complete:
+        lines.append(
+            f"ended by the limit on starts after {search.starts}: ask for more (most_starts=...)"
+        )
+    return lines
+
+
+def _resolution(search: SectionSearch) -> str:
+    text = f"{search.starts} starts in cells of {search.first:.2g} to {search.last:.2g}"
+    if search.dimension > 1:
+        text += f" of each axis, positions within {search.reach:.3g}"
+    else:
+        text += " of a period"
+    return f"{text}; an itinerary within a single first cell may be missed"

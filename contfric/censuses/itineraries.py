@@ -57,11 +57,6 @@ def is_stop(model: Model, pair: ReducedPair) -> bool:
     return not model.mode_by_name[mode].sliding and model.surface_by_name[surface].switching
 
 
-def stops_of(model: Model, itinerary: ReducedItinerary) -> int:
-    """Return the number of stops of an itinerary."""
-    return sum(is_stop(model, pair) for pair in itinerary)
-
-
 def canonical_pair(model: Model, itinerary: ReducedItinerary) -> ReducedItinerary:
     """Return the itinerary that stands for an itinerary and its mirror image in a census."""
     letters = letters_of(model)

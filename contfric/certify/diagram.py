@@ -71,7 +71,7 @@ def certify_diagram(
     things += [branch for _, branch in branches]
     tasks = {k: _Task(thing, diagram.parameter, until) for k, thing in enumerate(things)}
     found, ended = _proved(tasks, executor, progress or _silent)
-    late = [k for k in tasks if k not in found or _is_unfinished(found[k])]
+    late = [k for k in tasks if k not in found or bool(found[k].ended)]
     if late and not ended and time_limit is not None and time.time() > until:
         ended = f"the time limit of {time_limit:g} s ended the run"
     if late and ended:
@@ -108,10 +108,6 @@ def _tubes(
     proof: BranchCertificate | EventCertificate | None, until: float
 ) -> list[dict[str, Any]]:
     return tubes_of(proof, until) if isinstance(proof, BranchCertificate) else []
-
-
-def _is_unfinished(proof: BranchCertificate | EventCertificate) -> bool:
-    return bool(proof.ended)
 
 
 def _silent(_: str) -> None:

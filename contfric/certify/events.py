@@ -13,12 +13,12 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from flint import arb, arb_mat
 
 from contfric.base.shown import Shown
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
-from contfric.certify.disturbance import null_vector, pair_of
 from contfric.certify.extended import (
     Builder,
     at_joint,
@@ -37,6 +37,7 @@ from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, row_norm, working
+from contfric.models.definition import FloatArray
 from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 
@@ -338,3 +339,33 @@ def _admissible(
         _check_time(until)
         found.append(inequality.named(orbit.system))
     return all_of(found)
+
+
+def null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
+    """Return the unit vector that the linearised chain at the printed orbit maps nearest to zero."""
+    return [arb(float(x)) for x in np.linalg.svd(_linearised(orbit, segments, sigma))[2][-1]]
+
+
+def pair_of(orbit: Orbit, segments: Segments) -> tuple[Vector, Vector]:
+    """Return about (a, b, c, s) of a pair of multipliers ``c +- i s`` near the circle, and a functional.
+
+    The disturbance ``a + i b`` is turned so that a and b are orthogonal; the functional is 1 of a, 0 of b.
+    """
+    plus, minus = (_linearised(orbit, segments, sigma) for sigma in (1, -1))
+    mu = orbit.turn_multipliers
+    upper = mu[mu.imag > 0]
+    near = complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))]) if len(upper) else 1j
+    near /= abs(near)
+    vector = np.linalg.svd((plus + minus) / 2 + near * (plus - minus) / 2)[2][-1].conj()
+    vector = vector * np.exp(-0.5j * np.angle(np.sum(vector * vector)))
+    a, b = vector.real, vector.imag
+    length = float(np.linalg.norm(a))
+    start = [*(a / length), *(b / length), near.real, near.imag]
+    return [arb(float(x)) for x in start], [arb(float(x)) for x in a / length]
+
+
+def _linearised(orbit: Orbit, segments: Segments, sigma: int) -> FloatArray:
+    model = ball_model(orbit.model, orbit.params)
+    printed = [arb(float(x)) for x in orbit.joints.ravel()]
+    _, rows = Chain(segments, model).linearised(printed, sigma)
+    return np.array([[float(x.mid()) for x in row] for row in rows])

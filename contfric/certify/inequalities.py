@@ -122,7 +122,7 @@ def inequalities(
             order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
             if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
                 order = max(order, 1)  # it is not negative there, which is as good as zero
-            if order and _stays(row, path.field):
+            if order and all(x.is_zero() for x in numbers(row * path.field)):
                 continue
             if _is_event(touch, i, surface):
                 finding = touched(path, row, order, touch.after if touch is not None else None)
@@ -194,10 +194,6 @@ def _held(
 
 def _departs(touch: Touch, i: int) -> bool:
     return bool(touch.condition.departs) and touch.condition.segment == i
-
-
-def _stays(row: arb_mat, field: arb_mat) -> bool:
-    return all(x.is_zero() for x in numbers(row * field))
 
 
 def _inside(system: System, i: int, surfaces: list[str]) -> list[tuple[str, int]]:

@@ -1,4 +1,4 @@
-"""Prove a computed orbit.
+r"""Prove a computed orbit.
 
 1. Interval Newton (:mod:`contfric.certify.krawczyk`) on the chain of segments, in a box around the printed
    joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.
@@ -8,24 +8,34 @@
    with twice the digits.
 
 Where a contact never slips the orbits are a continuum. One of them is proved, alone among those that keep
-the same (:mod:`contfric.certify.kept`).
+the same (below).
 
 The stated error of the joints is what rounding of the flow and the residual do to them:
 ``|C| rho`` with C the inverse of the Jacobian and rho the rounding of one equation.
+
+What an orbit keeps (the offset of a stuck slider) follows from its equations. Let l be a row with
+``l M = 0`` in the mode of every segment, kept by its resets and by the closure. Then l y is the same at all
+joints, whatever it is: the orbits are a continuum, and the chain says ``l y_N = l y_0`` twice. It is given
+once: ``l y_0`` is what the printed joints keep, in the place of the equation of one state at the end of the
+last segment. Nothing is lost: ``l r = 0`` holds for the residual r of that segment, of which all entries
+but that one vanish, so that it vanishes, too. What is proved then is one orbit among those that keep the
+same.
+
+The rows l are sought by elimination in rational numbers, among the states whose rates are known exactly.
+What is not exactly kept counts as not kept.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
-from flint import acb, arb, arb_mat
+from flint import acb, arb, arb_mat, fmpq, fmpq_mat
 
 from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.inequalities import inequalities
-from contfric.certify.kept import Kept, kept_by_chain, with_kept
 from contfric.certify.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
 from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
@@ -42,8 +52,6 @@ _BITS = (128, 256, 512)
 _WIDE = 5
 #: Bits of the working precision that rounding of a chain may take: condition numbers to 1e9.
 _SPARE = 30
-#: Least share of the box that is tried where the Jacobian changes too much over it.
-_SMALLEST = 16
 _FAMILY = "it is one of a family of orbits, and it is not known exactly what a contact keeps"
 
 
@@ -211,3 +219,70 @@ def _nothing(
 ) -> Certificate:
     finding, unknown = Finding(verdict, why), Finding(Verdict.UNDECIDED, "no solution to speak of")
     return Certificate(orbit, finding, unknown, unknown, unknown, radii or [], [], [], bits)
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """A linear function of the state that an orbit keeps.
+
+    Attributes
+    ----------
+    row : l, by the states
+    state : one with ``l`` = 1 there, in which all others of the same orbit are 0
+    """
+
+    row: Vector
+    state: int
+
+
+def kept_by_chain(segments: Segments, model: BallModel) -> list[Kept]:
+    """Return a basis of the linear functions of the state that a chain keeps at every value of them."""
+    n = segments.states
+    size = model.size
+    matrices = [model.fields[mode] for mode in dict.fromkeys(segments.modes)]
+    for name in dict.fromkeys(name for name in segments.resets if name):
+        matrices.append(_less_identity(model.resets[name]))
+    closure = [[arb(c) for c in row] + [arb(0)] * (size - n) for row in segments.closure]
+    matrices.append(_less_identity(arb_mat(closure)))
+    exact = [k for k in range(n) if all(m[k, j].is_exact() for m in matrices for j in range(size))]
+    # an equation l A = 0 for each column A of them
+    rows = [[_rational(m[k, j]) for k in exact] for m in matrices for j in range(size)]
+    rows = [row for row in rows if any(row)]
+    if not exact or len(rows) == 0:
+        return []
+    reduced, rank = fmpq_mat(rows).rref()
+    pivots = [next(k for k in range(len(exact)) if reduced[i, k] != 0) for i in range(int(rank))]
+    found = []
+    for free in (k for k in range(len(exact)) if k not in pivots):
+        row = [arb(0)] * n
+        row[exact[free]] = arb(1)
+        for i, k in enumerate(pivots):
+            row[exact[k]] = -arb(reduced[i, free])
+        found.append(Kept(row, exact[free]))
+    return found
+
+
+def with_kept(
+    residual: Vector, rows: list[Vector], kept: list[Kept], x: Vector, printed: Vector
+) -> tuple[Vector, list[Vector]]:
+    """Return the equations of a chain that keeps what some printed joints do."""
+    if not kept:
+        return residual, rows
+    residual, rows = list(residual), list(rows)
+    n = len(kept[0].row)
+    for one in kept:
+        at = len(residual) - (n + 1) + one.state
+        pairs = zip(one.row, x[1 : n + 1], printed[1 : n + 1], strict=True)
+        residual[at] = sum((c * (y - p) for c, y, p in pairs), arb(0))
+        rows[at] = [arb(0), *one.row, *[arb(0)] * (len(rows[at]) - n - 1)]
+    return residual, rows
+
+
+def _less_identity(matrix: arb_mat) -> arb_mat:
+    entries = matrix.tolist()
+    return arb_mat([[c - (j == k) for j, c in enumerate(row)] for k, row in enumerate(entries)])
+
+
+def _rational(number: arb) -> fmpq:
+    mantissa, exponent = (int(part) for part in number.mid().man_exp())
+    return fmpq(mantissa) * fmpq(2) ** exponent

@@ -1,7 +1,7 @@
 r"""The Jacobian of a chain along a chord, up to second order in how long the chord is.
 
 The unknowns are ``X(s) = m + s d +- R`` for s in [-h, h]: joints and parameter, time in phases
-(:mod:`contfric.certify.phases`), so that neither period nor harmonics depend on the parameter p. With a
+(:mod:`contfric.certify.strand`), so that neither period nor harmonics depend on the parameter p. With a
 duration ``D(s)``, D_m at the middle, and ``delta = D - D_m``,
 
     exp(M D) = exp(M D_m) exp(M delta),        exp(M delta) = 1 + M delta + (M delta)^2 Y / 2,

@@ -320,12 +320,7 @@ def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     resets = [model.reset_by_surface[s] for s in surfaces if s in model.reset_by_surface]
     if any(reset.stays for reset in resets):
         return "grazing impact"
-    return kind.meaning if any(_is_rested_on(model, s) for s in surfaces) else "grazing"
-
-
-def _is_rested_on(model: Model, surface: str) -> bool:
-    """Tell whether motion can stay on a surface."""
-    return model.rests_on(surface)
+    return kind.meaning if any(model.rests_on(s) for s in surfaces) else "grazing"
 
 
 class LateText:

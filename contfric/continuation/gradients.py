@@ -91,10 +91,6 @@ def _sign(orbit: Orbit, location: EventFunction) -> float:
     return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
 
 
-def _which(active: int) -> np.ndarray:
-    return np.array([active], dtype=np.int64)
-
-
 def surface_gradient(
     orbit: Orbit, surface: str, joint: FloatArray, active: int
 ) -> tuple[FloatArray, float]:

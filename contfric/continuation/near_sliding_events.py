@@ -12,7 +12,7 @@ parameter's distance to the event: its slope vanishes at the event with d itself
 what is rounding.
 
 What is so near to a sliding event that the parameter does not tell it from that belongs to it
-(:func:`contfric.continuation.locate.belongs_to`). So nothing is lost if signs are taken where that begins:
+(:func:`contfric.continuation.resolve.belongs_to`). So nothing is lost if signs are taken where that begins:
 there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 1e-6 for c of order 1.
 """
 
@@ -61,7 +61,7 @@ def last_told(
     is infinite, or its sign is that of a rate that is rounding.
     """
     here = beyond.orbit(orbit, orbit.model.index_of(settings.parameter))
-    if beyond is not after and _comes_in(here):
+    if beyond is not after and bool(np.min(here.durations) < NO_LENGTH):
         told = _told_before(orbit, before, beyond, settings)
         if told is not None:
             return told
@@ -82,11 +82,6 @@ def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) ->
     if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
         return before
     return _if_finite(point_before(orbit, before, -SAME_LOCATION, settings)) or before
-
-
-def _comes_in(here: Orbit) -> bool:
-    """Tell whether a segment has no length at an event."""
-    return bool(np.min(here.durations) < NO_LENGTH)
 
 
 def _if_finite(point: Point | None) -> Point | None:

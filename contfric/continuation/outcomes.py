@@ -39,7 +39,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from contfric.continuation import standing_slides as slides
-from contfric.continuation.composed_outcomes import continuous_edit
+from contfric.continuation.contact_outcomes import continuous_edit
 from contfric.continuation.events import Kind
 from contfric.continuation.holdable import NoJump, check_held, check_inside, rest_mode
 from contfric.continuation.touching import chosen_at, crossed_at, entered_at, thrown_at

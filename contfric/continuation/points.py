@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,32 +171,13 @@ class Point:
         if len(self.w) == 1:  # a branch watches the slope of its parameter
             tests = tests.copy()
             tests[-EXTRA] *= -1.0
-        return Point(
-            self.joints,
-            self.w,
-            -self.tangent,
-            -self.direction,
-            tests,
-            self.labels,
-            self.mu,
-            self.arc,
-        )
+        found = altered(self, tangent=-self.tangent, direction=-self.direction, tests=tests)
+        found.lost = found.rough = False
+        return found
 
     def on_other_side(self) -> Point:
         """Return the same point with the arclength counted the other way."""
-        # dataclasses.replace takes several times as long, for each point of a curve
-        return Point(
-            self.joints,
-            self.w,
-            self.tangent,
-            self.direction,
-            self.tests,
-            self.labels,
-            self.mu,
-            -self.arc,
-            self.lost,
-            self.rough,
-        )
+        return altered(self, arc=-self.arc)
 
 
 @dataclass(eq=False)
@@ -229,6 +210,12 @@ class PointRows:
         )
 
     @property
+    def _of_points(self) -> tuple[Any, ...]:
+        """The arrays in the order of a point's fields, up to the arclength."""
+        own = self.joints, self.w, self.tangents, self.directions
+        return (*own, self.tests, self.labels, self.mu)
+
+    @property
     def values(self) -> FloatArray:
         """The parameter of a branch, one value a row."""
         return self.w[:, 0]
@@ -237,18 +224,7 @@ class PointRows:
         """Return the arrays up to a row, as the march takes them."""
         from contfric.continuation.geometry import Points
 
-        if stop is None:
-            return Points(*vars(self).values())
-        return Points(
-            self.joints[:stop],
-            self.w[:stop],
-            self.tangents[:stop],
-            self.directions[:stop],
-            self.arc[:stop],
-            self.tests[:stop],
-            self.labels[:stop],
-            self.mu[:stop],
-        )
+        return Points(*[array[:stop] for array in vars(self).values()])
 
     def first(self, count: int) -> PointRows:
         """Return the first rows."""
@@ -256,34 +232,17 @@ class PointRows:
 
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""
-        return Point(
-            self.joints[k].copy(),
-            self.w[k].copy(),
-            self.tangents[k].copy(),
-            self.directions[k].copy(),
-            self.tests[k].copy(),
-            self.labels[k].copy(),
-            self.mu[k].copy(),
-            float(self.arc[k]),
-        )
+        row = [*(array[k].copy() for array in self._of_points), float(self.arc[k])]
+        return Point(*row)
 
     def only(self) -> Point:
         """Return the first row as a point that shares the arrays: of rows that nothing else is written to."""
-        return Point(
-            self.joints[0],
-            self.w[0],
-            self.tangents[0],
-            self.directions[0],
-            self.tests[0],
-            self.labels[0],
-            self.mu[0],
-            float(self.arc[0]),
-        )
+        row = [*(array[0] for array in self._of_points), float(self.arc[0])]
+        return Point(*row)
 
     def points(self, start: int, stop: int) -> list[Point]:
         """Return rows as points of their own, which share one copy of each array."""
-        arrays = (self.joints, self.w, self.tangents, self.directions, self.tests, self.labels)
-        copies = [array[start:stop].copy() for array in (*arrays, self.mu)]
+        copies = [array[start:stop].copy() for array in self._of_points]
         arc = self.arc[start:stop].tolist()
         return [Point(*row) for row in zip(*copies, arc, strict=True)]
 

@@ -1,4 +1,4 @@
-"""Events of the last step of a branch: located, compared with known ones, and whether they end the branch."""
+"""Events of the last step of a branch: located, in order, compared with known ones; which end the branch."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import numpy as np
 
 from contfric.continuation.accuracy import not_critical
 from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
-from contfric.continuation.events import Bifurcation, End, EndReason, Kind
+from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import ends_at_limit, is_at_limit, limit_crossed, limit_end
-from contfric.continuation.locate import belongs_to, locate_events
-from contfric.continuation.near_sliding_events import SAME_LOCATION
+from contfric.continuation.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.section_joints import (
     LAST_CROSSING,
@@ -18,7 +17,8 @@ from contfric.continuation.section_joints import (
     move_joints,
 )
 from contfric.continuation.side import Side
-from contfric.continuation.sliding import nearly_reached
+from contfric.continuation.sliding import nearly_reached, sliding_events
+from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
 from contfric.continuation.stopping import stop_between
 from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.orbit.orbit import Orbit
@@ -27,6 +27,9 @@ from contfric.orbit.orbit import Orbit
 _AT_LIMIT = 1e-6
 #: A margin this negative (nondimensional) is violated; a located limit is good to rounding.
 VIOLATED = 1e-9
+#: Events from which simpler orbits go on, and how much farther (in their accuracies) they are told from what
+#: is next to them.
+_OPENS, _TOLD = frozenset({Kind.BP, Kind.PD}), 10.0
 
 
 def end_of_holds(orbit: Orbit, side: Side, settings: Settings, stuck: bool) -> bool:
@@ -133,7 +136,7 @@ def _is_known(
         return True
     if bifurcation.kind is not Kind.T:
         return False
-    if _is_start(side, before, point):
+    if side.count == 2 and point.arc - before.arc < SAME_LOCATION:
         side.relabel_first(after.labels)  # where a stop lies on a surface its label is arbitrary
         return True
     return is_known_touch(side, point)
@@ -156,6 +159,44 @@ def _comes_closer(
     return True
 
 
-def _is_start(side: Side, before: Point, point: Point) -> bool:
-    """Tell whether a change of labels happens at the very start of a side, at an event."""
-    return side.count == 2 and point.arc - before.arc < SAME_LOCATION
+def locate_events(
+    orbit: Orbit, before: Point, after: Point, settings: Settings
+) -> list[tuple[Bifurcation, Point]]:
+    """Return the bifurcations between two points with their located points, in order.
+
+    A point that is ``lost`` is no event: Newton fails after it before any condition is violated.
+    """
+    sliding = sliding_events(orbit, before, after, settings)
+    if not sliding:
+        smooth = smooth_events(orbit, before, after, settings, after)
+        return sorted(smooth, key=lambda pair: pair[1].arc)
+    end = sliding[0][1]
+    if end.arc <= before.arc:  # it is at the first point: nothing comes before it
+        return sliding
+    smooth = [
+        (b, point)
+        for b, point in smooth_events(orbit, before, after, settings, end)
+        if point.arc < end.arc and not belongs_to(b, point, end, settings)
+    ]
+    return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
+
+
+def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings) -> bool:
+    """Tell whether a smooth event before a sliding event, or after it, is part of it.
+
+    Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a location
+    along the branch is good to the root of what the parameter is. A vertex is no such fold: the simpler
+    orbits there have been solved. And where no multiplier is infinite a branch point or a doubling is known
+    well: with little damping it lies as near to a slide of no length as the damping is small.
+    """
+    if event.kind in TERMINAL:
+        return False
+    apart = abs(point.arc - end.arc)
+    gap = abs(point.value - end.value) / settings.width
+    if event.kind in _OPENS and gap > 0.0 and apart < SAME_LOCATION:
+        return gap <= _TOLD * event.accuracy
+    if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_LOCATION):
+        return True
+    if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
+        return False
+    return gap < SAME_VALUE and apart < SAME_FOLD

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.holds_forward import with_holds_forward
+from contfric.continuation.holds_forward import nearer_than_twins, with_holds_forward
 from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
 from contfric.continuation.points import Point, Settings
@@ -15,7 +15,6 @@ from contfric.continuation.report import bifurcation_at
 from contfric.continuation.side import point_before
 from contfric.continuation.standing_slides import goes_nowhere
 from contfric.continuation.touching import is_rate_of
-from contfric.continuation.twin_slides import nearer_than_twins
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, inside_sign
 from contfric.signature.holds import ends_rest, is_hold

@@ -12,7 +12,7 @@ without. Likewise a rest whose load just touches its limit may have a slip of ze
 
 from __future__ import annotations
 
-from contfric.continuation.composed_outcomes import Joints, Speeds
+from contfric.continuation.contact_outcomes import Joints, Speeds
 from contfric.continuation.holdable import NO_JUMP, NoJump
 from contfric.continuation.touching import rate_along
 from contfric.errors import NotationError

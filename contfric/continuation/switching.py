@@ -9,10 +9,12 @@ run through twice has one that changes sign after one turn. The branch that leav
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.attributes import altered
 from contfric.continuation.crossing import Direction
 from contfric.continuation.points import EXTRA, Point, Settings, displaced
 from contfric.continuation.side import first_point
@@ -34,17 +36,11 @@ _AT_ONCE = 0.01
 _CORNER, _NO_CHANGE = 1e-3, 1e-11
 
 
-@dataclass(frozen=True, eq=False)
-class BranchStart:
-    """A location and direction to start a branch from, and what it comes from.
+class BranchStart(NamedTuple):
+    """A point and direction to start a branch from; ``origin`` is the first one, at the event itself."""
 
-    ``origin`` is the orbit at the event itself, the first point of the new branch.
-    """
-
-    orbit: Orbit
     point: Point
     origin: Point
-    reason: str
 
 
 def null_vector(orbit: Orbit) -> FloatArray:
@@ -65,7 +61,7 @@ def null_direction(orbit: Orbit) -> Direction:
 
 @foreseeable()
 def leave_along(
-    orbit: Orbit, settings: Settings, direction: Direction, reason: str, distance: float = LEAVE
+    orbit: Orbit, settings: Settings, direction: Direction, distance: float = LEAVE
 ) -> BranchStart | None:
     """Return a start on the branch that leaves a singular orbit in a direction."""
     active = orbit.model.index_of(settings.parameter)
@@ -80,7 +76,22 @@ def leave_along(
     at = np.array([settings_value(orbit, settings)])
     origin = replace(point, joints=orbit.joints, w=at, arc=0.0)  # no solve where it is singular
     point.arc = distance
-    return BranchStart(orbit, point, origin, reason)
+    return BranchStart(point, origin)
+
+
+def start_beside(orbit: Orbit, point: Point, settings: Settings, along: FloatArray) -> BranchStart:
+    """Return a point next to a singular orbit as the start of a branch that leaves the orbit.
+
+    Parameters
+    ----------
+    along : how joints move away from the orbit: the branch goes on to that side
+    """
+    if float(np.sum(along * point.tangent)) < 0.0:
+        point = point.reversed()
+    value = np.array([settings_value(orbit, settings)])
+    origin = altered(point, joints=orbit.joints, w=value, arc=0.0)
+    point.arc = float(np.linalg.norm(point.joints - orbit.joints)) / len(orbit.joints) ** 0.5
+    return BranchStart(point, origin)
 
 
 def overshoots(
@@ -97,7 +108,7 @@ def overshoots(
     """
     from contfric.continuation.steps import CHI_MINUS
 
-    nearer = leave_along(orbit, settings, along, departure.reason, _AT_ONCE * distance)
+    nearer = leave_along(orbit, settings, along, _AT_ONCE * distance)
     if nearer is None:
         return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]

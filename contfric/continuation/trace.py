@@ -1,21 +1,31 @@
-"""One branch, traced in both directions from its start to its ends."""
+"""One branch, traced in both directions from its start to its ends.
+
+At a corner two branches of one itinerary meet, and a march goes on from one to the other. At the end of a
+continuum (Omega = 1/2, no damping) a margin falls to zero along one branch, and grows again along another
+one of the same itinerary: the equations left over begin with a quadratic form, of which each is one line
+(:mod:`contfric.atlas.families`). No test changes its sign there. Newton's method sees a hyperbola that is
+as wide as rounding makes it, and steps that are short enough turn with it. What is smooth turns in
+proportion to the step.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.corners import ends_at_corner
 from contfric.continuation.ending import endless, grows, never_leaves, slows_down
-from contfric.continuation.events import TERMINAL, End, EndReason
+from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason
 from contfric.continuation.limits import is_at_limit, limit_end
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
+from contfric.continuation.report import ROUGH
 from contfric.continuation.resolve import end_of_holds, resolve
 from contfric.continuation.section_joints import move_joints
 from contfric.continuation.side import Side, first_point
+from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.start import start_of, too_fast
 from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
@@ -29,6 +39,15 @@ from contfric.remember.journal import remembered
 _CRAWLS = 1e-6
 
 Progress = Callable[[str], None]
+#: A turn (rad) over a step (arclength) that no smooth branch makes: steps are chosen to turn by 0.12, and
+#: those that do within hundreds of roots of rounding have a radius of less than 1e-4.
+_TURN, _STEP = 0.12, 1e-5
+#: Distance from the start of a side below which the step control has not found its step yet.
+_START = 10.0 * _STEP
+#: Share of what a margin was along the side that is left of it where it vanishes; and the most that is left,
+#: at the tip of a hyperbola as wide as rounding makes it: some hundreds of units of rounding come together in
+#: a margin. Where margins stay above, steps are short for another reason.
+_FALLEN, _LEFT = 1e-2, 1e3 * float(np.finfo(float).eps)
 
 
 def continue_orbit(
@@ -271,3 +290,37 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:
     """Return the last orbit of a side."""
     return side.tip.orbit(orbit, orbit.model.index_of(settings.parameter))
+
+
+def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> bool:
+    """End a side at the first corner among its last points, if there is one at which a margin vanishes.
+
+    Parameters
+    ----------
+    fresh : number of points that are new
+    """
+    rows, last = side.rows, side.last
+    first = max(0, last - fresh)
+    steps = rows.arc[first + 1 : last + 1] - rows.arc[first:last]
+    short = (steps < _STEP) & (rows.arc[first:last] - side.first.arc > _START)
+    if not short.any():
+        return False
+    z, w = rows.tangents[first : last + 1], rows.directions[first : last + 1, 0]
+    along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * settings.scale
+    for k in first + np.flatnonzero(short & (along < np.cos(_TURN))):
+        tip = rows.point(int(k))
+        found = nearly_reached(orbit, tip, settings)
+        if found is None or not _has_fallen(side, orbit, int(k), found):
+            continue
+        # it lies within the step over which the branch turns
+        known = max(ROUGH, 2.0 * float(steps[k - first]) / settings.width)
+        side.rewind(int(k))
+        side.end = End(EndReason[found.kind.name], bifurcation=replace(found, bound=known))
+        return True
+    return False
+
+
+def _has_fallen(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> bool:
+    """Tell whether a margin has come to zero along a side, and is not zero all along."""
+    before = side.rows.tests[: k + 1, orbit.system.tests.index(found.tests[0])]
+    return bool(before[-1] < min(_LEFT, _FALLEN * np.max(before)))

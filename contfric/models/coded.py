@@ -62,7 +62,7 @@ class Forms:
         self.modes: list[ModeText] = []
         self.fields: list[Form] = []
         for mode in description.modes:
-            self.add(mode)
+            self.add(mode, {})
         self.period = self._constant(description.period or "0")
         self.scales = [self._constant(text) for text in description.spread]
         self.resets = {
@@ -71,14 +71,12 @@ class Forms:
             if s.name in description.resets
         }
 
-    def add(self, mode: ModeText) -> None:
-        """Read the rates in a mode, which comes behind those that are known."""
+    def add(self, mode: ModeText, named: Mapping[str, str]) -> None:
+        """Read the rates in a mode, which comes behind those that are known; they use named expressions."""
+        for name, text in named.items():
+            self._scope.values[name] = self.form(text)
         self.modes.append(mode)
         self.fields.append(self._field(mode))
-
-    def name(self, name: str, text: str) -> None:
-        """Give an expression a name, that others can use."""
-        self._scope.values[name] = self.form(text)
 
     def see(self, surface: Surface, formula: str) -> bool:
         """Read a surface that comes behind those that are known; tell whether its observable is new."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -77,9 +77,9 @@ class CodedFlow:
             self._idle = np.pad(self._idle, more)
         self._idle[m, c] = asked and self._forms.is_idle(m, c)
 
-    def add(self, mode: ModeText) -> None:
-        """Add a mode. The functions and their addresses stay the same."""
-        self._forms.add(mode)
+    def add(self, mode: ModeText, named: Mapping[str, str]) -> None:
+        """Add a mode, with what its rates name. The functions and their addresses stay the same."""
+        self._forms.add(mode, named)
         self._write(len(self._forms.fields) - 1)
         self._renew()
 

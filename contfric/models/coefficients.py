@@ -55,7 +55,7 @@ class Coefficient:
             total = before + c
             small = _ROUNDING * (abs(before) + abs(c))
             found[product] = 0.0 if abs(total) <= small else total
-        return _coefficient(found)
+        return Coefficient(tuple(sorted((p, c) for p, c in found.items() if c != 0.0)))
 
     def __neg__(self) -> Coefficient:
         return Coefficient(tuple((product, -c) for product, c in self.parts))
@@ -89,10 +89,6 @@ class Coefficient:
     def function(self, name: str, *more: Coefficient) -> Coefficient:
         """Return a function of it, by its name in the language of expressions."""
         return Coefficient((((((Atom(name, (self, *more)), 1),)), 1.0),))
-
-
-def _coefficient(parts: Mapping[Product, float]) -> Coefficient:
-    return Coefficient(tuple(sorted((p, c) for p, c in parts.items() if c != 0.0)))
 
 
 def _joined(first: Product, second: Product) -> Product:

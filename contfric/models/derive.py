@@ -79,7 +79,7 @@ def model_from(description: Description) -> Model:
         If the description contradicts itself; with the address of the entry.
     """
     if description.structure:
-        from contfric.models.composing import composed_from
+        from contfric.models.structure_model import composed_from
 
         return composed_from(description)
     params = defaults(description)

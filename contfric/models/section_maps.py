@@ -1,8 +1,9 @@
-"""What a model says of its sections: surfaces between two parts of one mode, across which nothing changes.
+"""What a model is asked for by name, and its sections: surfaces between two parts of one mode.
 
-An orbit needs one joint at least. A model whose cycles may be smooth therefore declares the surface of its
-stops (``v = 0``) with two modes of the same field. They are one mode (:attr:`SectionMaps.joined`), and the
-surface is a section: transparent, but for cycles that meet nothing else.
+Across a section nothing changes. An orbit needs one joint at least. A model whose cycles may be smooth
+therefore declares the surface of its stops (``v = 0``) with two modes of the same field. They are one mode
+(:attr:`SectionMaps.joined`), and the surface is a section: transparent, but for cycles that meet nothing
+else.
 """
 
 from __future__ import annotations
@@ -11,13 +12,20 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from contfric.models.lookup import Lookup
+if TYPE_CHECKING:
+    from contfric.models.parts import Domain, Mode, Observable, Parameter, Reset, Surface
 
 
-class SectionMaps(Lookup):
-    """The part of a model that derives its sections from its domains and transitions."""
+class SectionMaps:
+    """The part of a model that looks up its names, and derives its sections from domains and transitions."""
 
     if TYPE_CHECKING:
+        parameters: tuple[Parameter, ...]
+        observables: tuple[Observable, ...]
+        surfaces: tuple[Surface, ...]
+        modes: tuple[Mode, ...]
+        domains: tuple[Domain, ...]
+        resets: tuple[Reset, ...]
         stop_surface: str
         phase: str
 
@@ -27,6 +35,50 @@ class SectionMaps(Lookup):
 
         def cuts(self, surface: str) -> bool:
             """Return whether motion is cut at a surface."""
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters in the order of the engine's vectors."""
+        return tuple(p.name for p in self.parameters)
+
+    @cached_property
+    def domain_by_name(self) -> dict[str, Domain]:
+        """Domains by their names."""
+        return {d.name: d for d in self.domains}
+
+    @cached_property
+    def mode_by_name(self) -> dict[str, Mode]:
+        """Modes by their names."""
+        return {m.name: m for m in self.modes}
+
+    @cached_property
+    def surface_by_name(self) -> dict[str, Surface]:
+        """Surfaces by their names."""
+        return {s.name: s for s in self.surfaces}
+
+    @cached_property
+    def mode_index(self) -> dict[str, int]:
+        """Positions of the modes in the engine's tables, by their names."""
+        return {m.name: k for k, m in enumerate(self.modes)}
+
+    @cached_property
+    def surface_index(self) -> dict[str, int]:
+        """Positions of the surfaces, by their names."""
+        return {s.name: k for k, s in enumerate(self.surfaces)}
+
+    @cached_property
+    def observable_index(self) -> dict[str, int]:
+        """Positions of the observables, by their names."""
+        return {o.name: k for k, o in enumerate(self.observables)}
+
+    @cached_property
+    def reset_by_surface(self) -> dict[str, Reset]:
+        """Resets by the names of their surfaces."""
+        return {r.surface: r for r in self.resets}
+
+    def is_sliding(self, domain: str) -> bool:
+        """Return whether motion in a domain stays on a surface (a stick)."""
+        return self.mode_by_name[self.domain_by_name[domain].mode].sliding
 
     @cached_property
     def joined(self) -> dict[str, str]:

@@ -42,7 +42,7 @@ class TransitionMaps(SectionMaps):
 
     @property
     def composed(self) -> bool:
-        """Whether modes are made when they are visited (:mod:`contfric.models.composed`)."""
+        """Whether modes are made when they are visited (:mod:`contfric.models.structure_model`)."""
         return False
 
     def mode_order(self, name: str) -> int:

@@ -44,8 +44,8 @@ from contfric.compiled import (
 from contfric.flow.general import kernels_of
 from contfric.flow.layouts import FlowType
 from contfric.handle import TABLE, WEIGHTS, Block, Bound, HandleType, with_handle
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
+from contfric.models.structure_model import ComposedModel
 from contfric.orbit.equations import LayoutType
 from contfric.orbit.integral_parts import IntegralCourse, reach_node
 from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn

@@ -17,9 +17,9 @@ from functools import cache
 
 import numpy as np
 
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.evaluate import Sampler, defaults, floats
+from contfric.models.structure_model import ComposedModel
 
 Itinerary = tuple[tuple[str, str], ...]
 #: Parameters, time, state and rate.

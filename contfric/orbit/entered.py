@@ -18,8 +18,8 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import Domain, FloatArray, Model, Surface
+from contfric.models.structure_model import ComposedModel
 from contfric.models.view import FlowView
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.time_scale import clock_period, time_scale

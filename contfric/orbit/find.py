@@ -20,12 +20,11 @@ from contfric.orbit.aperiodic import (
     why_none,
 )
 from contfric.orbit.clock import clocked
+from contfric.orbit.kept_positions import Places
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.places import Places
 from contfric.orbit.repetition import shortest
-from contfric.orbit.rest import check_rest, comes_to_rest, is_point, winds
+from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, creeps, is_point, winds
 from contfric.orbit.sections import is_smooth, loops, without_sections
-from contfric.orbit.shakedown import beyond_creep, creeps
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.solve import centred, refine_with_symmetry
 from contfric.orbit.system import build_system

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from contfric.models.composed import ComposedModel
-from contfric.models.composition import Way
 from contfric.models.definition import FloatArray
+from contfric.models.structure_model import ComposedModel
+from contfric.models.structure_modes import Way
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import (
     Tables,

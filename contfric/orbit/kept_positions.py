@@ -1,17 +1,19 @@
-"""What an orbit keeps: the places of contacts that never slip, in words and with their gradients."""
+"""What an orbit keeps: where contacts rest that never slip, in words, with gradients, and as given."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from contfric.errors import ParameterError, did_you_mean, real_number
+from contfric.errors import ConvergenceError, ParameterError, did_you_mean, real_number
 from contfric.models.definition import FloatArray, Model
 from contfric.models.evaluate import Evaluator, floats
 from contfric.orbit.conserved import conserved
+from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
     from contfric.models.contact_laws import ContactLaws
@@ -195,3 +197,56 @@ def _evaluator(model: Model) -> Evaluator[float]:
     from contfric.models.describe import from_text
 
     return floats(from_text(model.definition))
+
+
+class Places:
+    """Positions at which contacts rest that never slip.
+
+    Parameters
+    ----------
+    at : what a user gives; it comes before what the model's file says
+    """
+
+    def __init__(self, model: Model, params: dict[str, float], at: Mapping[str, float] | None):
+
+        self.model, self.params = model, params
+        self.given = {} if at is None else checked_positions(model, at)
+        self.stated = {
+            k: v for k, v in stated_positions(model, params).items() if k not in self.given
+        }
+
+    def begin(self, state: ArrayLike | None) -> ArrayLike | None:
+        """Return the state that a simulation starts from: the contacts at their places, and at rest."""
+        if not (self.given or self.stated):
+            return state
+        from contfric.orbit.starts import checked_state
+
+        y = checked_state(self.model, self.model.vector(self.params), state)
+        return stuck_at(self.model, y, self._all)
+
+    def put(self, orbit: Orbit) -> Orbit:
+        """Return an orbit with its contacts at their places; what slips has none, by a file.
+
+        Raises
+        ------
+        ParameterError
+            If a contact for which the user gives a place slips, or cannot be there.
+        ConvergenceError
+            If one cannot be where the file says.
+        """
+        if not (self.given or self.stated):
+            return orbit
+        from contfric.orbit.resting_positions import resting_at
+
+        kept = [p.contact for p in positions_of(orbit)]
+        stated = {name: value for name, value in self.stated.items() if name in kept}
+        try:
+            return resting_at(orbit, {**stated, **self.given})
+        except ParameterError as error:
+            if self.given:
+                raise
+            raise ConvergenceError(f"{error} ('at' of the model's file)", orbit) from None
+
+    @cached_property
+    def _all(self) -> dict[str, float]:
+        return {**self.stated, **self.given}

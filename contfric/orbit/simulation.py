@@ -17,8 +17,8 @@ from contfric.base.tabled import as_table
 from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
+from contfric.models.structure_model import ComposedModel
 from contfric.models.tied import tied
 from contfric.orbit.dense import sample, table
 from contfric.orbit.growing_tables import SOLVED, growing_tables

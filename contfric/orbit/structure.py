@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import Model
 from contfric.models.made import Made
+from contfric.models.structure_model import ComposedModel
 
 
 @cache

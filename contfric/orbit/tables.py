@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.errors import ModelError, ParameterError
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import Domain, Mode, Model, Surface
 from contfric.models.parts import MOST_SURFACES
+from contfric.models.structure_model import ComposedModel
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.system import IntArray
 

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: branches against their parameter, with the events on them."""
+"""Bifurcation diagrams: branches against their parameter, with their stability and the events on them."""
 
 from __future__ import annotations
 
@@ -8,37 +8,46 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from contfric.plot.events import Mark, label_marks, marks_of
+from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
 from contfric.plot.inset import Inset, add_inset
 from contfric.plot.labels import lay_out
 from contfric.plot.legend import handles_of
 from contfric.plot.look import LineStyle, Look
-from contfric.plot.names import full_title
+from contfric.plot.names import full_title, parameter_label
 from contfric.plot.response import draw_overlay
-from contfric.plot.rows import draw_row, model_of
-from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of
-from contfric.plot.style import NEXT_TO, SMALL, TEXT, row_of, sized
+from contfric.plot.runs import stability_runs
+from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of, name_axes
+from contfric.plot.style import (
+    BRIDGE_COLOUR,
+    BRIDGE_WIDTH,
+    LINE_WIDTH,
+    MIRROR_WIDTH,
+    NEXT_TO,
+    SMALL,
+    TEXT,
+    UNKNOWN_WIDTH,
+    greyish,
+    lighter,
+    row_of,
+    sized,
+)
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
     from contfric.continuation.events import Bifurcation
+    from contfric.models.definition import Model
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
+#: Width of a figure (inches) below which numbers along its axis would meet, and its parts then.
+_COLUMN, _TICKS = 4.5, 5
+
 
 def plot_branches(
-    branches: Sequence[Branch],
-    row: QuantityLike = "x_max",
-    ax: Axes | None = None,
-    *,
-    events: bool = True,
-    legend: bool = True,
-    names: Mapping[str, str] | None = None,
-    colours: Mapping[str, str] | None = None,
-    linestyles: Mapping[str, LineStyle] | None = None,
+    branches: Sequence[Branch], row: QuantityLike = "x_max", ax: Axes | None = None
 ) -> Axes:
-    r"""Draw one quantity of some branches against their parameter.
+    r"""Draw one quantity of some branches against their parameter, with their bifurcations.
 
     Stable parts are solid, unstable ones dashed, and they meet at the located bifurcation. Bridges,
     whose orbits have holds, are finely dotted and grey.
@@ -49,17 +58,8 @@ def plot_branches(
     row : str or callable
         The quantity, as for :meth:`contfric.Branch.quantity`.
     ax : Axes, optional
-        Where to draw; new axes by default.
-    events : bool
-        Whether to mark and label the branches' bifurcations.
-    legend : bool
-        Whether to draw the legend: next to new axes, or inside yours, there without the meaning of
-        the markers.
-    names, colours : mapping, optional
-        What branches are called in the legend, and colours of theirs, by their names.
-    linestyles : mapping, optional
-        Line styles of matplotlib for ``"stable"``, ``"unstable"``, ``"unknown"`` (no multipliers) and
-        ``"bridge"``.
+        Where to draw; new axes by default. The legend stands next to these, or inside yours, there without
+        the meaning of the markers.
 
     Examples
     --------
@@ -70,8 +70,8 @@ def plot_branches(
     '$\\psi$'
     """
     row_of(row, model_of(branches))  # before a figure is opened for it
-    found = [b for branch in branches for b in branch.bifurcations] if events else []
-    look = Look.of(branches, names, colours, linestyles, legend=legend)
+    found = [b for branch in branches for b in branch.bifurcations]
+    look = Look.of(branches, None, None, legend=True)
     return _plot_row(axes_or_new(ax), branches, found, row, look, outside=ax is None)
 
 
@@ -243,3 +243,63 @@ def _label_row(
     if inner is not None:
         low, high = inner.get_xlim()
         label_marks(inner, [m for m in marks if low <= m.x <= high])
+
+
+def model_of(branches: Sequence[Branch]) -> Model | None:
+    """Return the model of some branches; None without any."""
+    return branches[0].model if branches else None
+
+
+def draw_row(
+    ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark], row: QuantityLike, look: Look
+) -> None:
+    """Draw one quantity of branches, with the marks of events, and name the axes."""
+    label = row_of(row, model_of(branches))
+    twins = {b.name for b in branches if not b.mirrored} if label.even else set()
+    for branch in sorted(branches, key=lambda b: not b.mirrored):
+        if branch.mirrored and branch.name in twins:
+            continue  # it lies on its original
+        if branch.bridge:
+            _draw_bridge(ax, branch, row, look)
+        else:
+            _draw_branch(ax, branch, row, look)
+    draw_marks(ax, marks)
+    ax.margins(y=0.12)
+    displacement = branches[0].model.states[0] if branches else "x"
+    across = parameter_label(branches[0].parameter) if branches else None
+    name_axes(ax, across, label.name(displacement))
+    if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
+        ax.locator_params(axis="x", nbins=_TICKS)
+
+
+def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
+    width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
+    colour = look.colours[branch.name]
+    colour = lighter(colour) if branch.mirrored else colour
+    for run in stability_runs(branch, row):
+        known = run.stable is not None
+        lines = ax.plot(
+            *run.line,
+            color=colour if known else greyish(colour),
+            linestyle=look.styles[
+                "unknown" if not known else "stable" if run.stable else "unstable"
+            ],
+            linewidth=sized(width if known else UNKNOWN_WIDTH),
+            solid_capstyle="butt",
+            zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
+        )
+        for line in lines:
+            line.set_gid(branch.name)
+
+
+def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
+    for run in stability_runs(branch, row):
+        lines = ax.plot(
+            *run.line,
+            color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
+            linestyle=look.styles["bridge"],
+            linewidth=sized(BRIDGE_WIDTH),
+            zorder=1.6 - 0.1 * branch.mirrored,
+        )
+        for line in lines:
+            line.set_gid(branch.name)

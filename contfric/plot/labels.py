@@ -1,19 +1,26 @@
-"""Labels next to points, off the lines and off each other."""
+"""Labels next to points, off the lines and off each other.
+
+Ticks are measured once in a layout: matplotlib does it two to four times for each axis. A layout asks each
+axis for its size. The axis then updates its ticks and measures their labels for itself, and once more for
+every axis whose label is aligned with its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
-from contfric.plot.measured import ticks_measured_once
 from contfric.plot.style import GREY, SMALL, sized
 
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.
@@ -30,6 +37,8 @@ _FEW, _ONE_OF_MANY, _NEAREST, _HIDES = 14, 60.0, 3, 30.0
 _CELL = 0.5
 #: Radius of a neighbourhood, in points.
 _NEAR = 18.0
+#: What an axis calls, by names that are no part of matplotlib's interface.
+_UPDATE, _MEASURE = "_update_ticks", "_get_ticklabel_bboxes"
 
 
 @dataclass(frozen=True)
@@ -241,3 +250,37 @@ def marker_pixels(ax: Axes) -> FloatArray:
         centres = np.asarray(line.get_transform().transform(line.get_xydata()))
         found.append((centres[:, None, :] + radius * disc).reshape(-1, 2))
     return np.vstack(found)
+
+
+@contextmanager
+def ticks_measured_once(figure: Figure) -> Iterator[None]:
+    """Let the axes of a figure keep their ticks while they stay where they are, in a ``with``.
+
+    Nothing else may change in the figure there but its layout. Where matplotlib has no methods of these names
+    nothing is kept.
+    """
+    known = all(hasattr(Axis, name) for name in (_UPDATE, _MEASURE))
+    axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)] if known else []
+    for axis in axes:
+        for name in (_UPDATE, _MEASURE):
+            setattr(axis, name, _kept(axis, getattr(axis, name)))
+    try:
+        yield
+    finally:
+        for axis in axes:
+            for name in (_UPDATE, _MEASURE):
+                delattr(axis, name)
+
+
+def _kept(axis: Axis, method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method that answers as the last time where axes, limits and arguments are those of then."""
+    last: list[Any] = [None, None, ()]
+
+    def answer(*given: Any) -> Any:
+        where = (*axis.axes.bbox.bounds, *axis.get_view_interval())
+        asked = (where, [*map(id, given[0])] if given else None)
+        if last[0] != asked:
+            last[:] = asked, method(*given), given  # what is held keeps its identity
+        return last[1]
+
+    return answer

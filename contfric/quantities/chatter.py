@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 _SLOWEST = 1e-5
 #: Periods (or units of time) that a flight is looked for in.
 _LONGEST = 64.0
-_NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))
 
 

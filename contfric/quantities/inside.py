@@ -11,10 +11,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from contfric.errors import ParameterError, did_you_mean
-from contfric.models.composed import ComposedModel
 from contfric.models.definition import FloatArray, Model
 from contfric.models.grammar import PI, TIME, Scope, names_in, parse
 from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contact
+from contfric.models.structure_model import ComposedModel
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function

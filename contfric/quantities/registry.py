@@ -63,8 +63,6 @@ NAMED = {
         "largest speed at which a wall is met; 0 without impacts", "impact velocity"
     ),
 }
-#: Those that are measured by code of their own inside of expressions.
-MEASURED = ("period", "multiplier", "sticking", "impact_velocity")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Points of one solution on a section, and the maps from each to the next."""
+"""Points of one solution on a section, and the maps from each to the next, whose chaos may be proved."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.extras import need_flint
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown, whole_number
 from contfric.models.definition import FloatArray, Model
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from contfric.certify.horseshoe import Horseshoe
+
+#: Releases of the long orbit that says where the window may be, and those that are left out before.
+_ORBIT, _SETTLED = 3000, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,8 +221,6 @@ class ReleaseMap(Tabled):
         >>> print(found.horseshoe(2))
         undecided: no horseshoe was seen
         """
-        from contfric.response.proved import horseshoe_of
-
         return horseshoe_of(self, whole_number("most", most, least=1))
 
     def columns(self) -> Columns:
@@ -239,3 +241,32 @@ class ReleaseMap(Tabled):
             f"<ReleaseMap of {self.model.name}: {len(self)} releases at {self.surface}, "
             f"{len(self.branches)} branches, {values}>"
         )
+
+
+def horseshoe_of(releases: ReleaseMap, most: int) -> Horseshoe:
+    """Return what is proved of a release map; see :meth:`contfric.response.returns.ReleaseMap.horseshoe`."""
+    need_flint()
+    from contfric.certify.horseshoe import Sampled, find_horseshoe
+    from contfric.certify.returns import Release
+    from contfric.response.release import image_of, release_of
+
+    model = releases.model
+    way, rests = release_of(model, releases.surface)
+    image = image_of(model, way)
+    surfaces = [s.name for s in model.surfaces]
+    release = Release(
+        releases.mode,
+        releases.surface,
+        rests,
+        way.following,
+        way.on,
+        surfaces[image[1]] if image else "",
+    )
+    longest = max(releases.branches, key=lambda pair: len(pair[0]), default=(np.zeros(1),) * 2)
+    starts = longest[0][:: max(1, len(longest[0]) // 5)]
+    orbits = [releases.cobweb(float(t), _ORBIT)[_SETTLED:] for t in starts]
+    orbit = max(orbits, key=lambda x: len(np.unique(x.round(6))))
+    if not len(orbit):
+        orbit = releases.phases
+    sampled = Sampled(releases.phases, releases.images, releases.branch, orbit, releases.period)
+    return find_horseshoe(model, releases.vector, release, sampled, most)

@@ -1,4 +1,7 @@
-"""The computation of a sweep: arguments checked, stretches computed one after the other, gathered, kept."""
+"""The computation of a sweep: arguments checked, stretches computed one after the other, gathered, kept.
+
+A stretch of a sweep is an independent task that any process can compute, to the same bits.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.tiles import inside
+from contfric.chaos.work import TileTask
 from contfric.errors import ParameterError, function_of, real_number, shown
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
@@ -24,16 +28,17 @@ from contfric.orbit.system import IntArray
 from contfric.orbit.time_scale import clock_period
 from contfric.remember.folder import kept_in
 from contfric.remember.journal import Parts
-from contfric.response.collecting import repeats_of
+from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Cut, Following
 from contfric.response.outcome import Outcome
 from contfric.response.sections import SectionLike, section_of, usual_section
-from contfric.response.stretch import STRETCH, Stretch, StretchRows, compute_stretch
 from contfric.response.sweep import Sweep, SweepRun
 
 _DIRECTIONS = {"both": ("up", "down"), "up": ("up",), "down": ("down",)}
 #: Bytes of a value: its parameters, its result, and a few points.
 _BYTES = 1024
+#: Values in a stretch: some hundredths of a second, so that an interrupt loses little.
+STRETCH = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,4 +268,63 @@ def _run(job: _SweepJob, direction: str, stretches: Sequence[StretchRows]) -> Sw
         joined("modes", none).astype(np.uint8),
         joined("times", np.empty(0)),
         joined("states", np.empty((0, len(job.model.states)))),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class StretchRows:
+    """Results of a stretch, value by value.
+
+    Attributes
+    ----------
+    outcomes, periods, upto : what each solution came to, the periods after which it repeats itself, and the
+        points up to it, shape (values,)
+    cycles, modes, times, states : the points
+    last : state to be carried over, shape (n,)
+    """
+
+    outcomes: IntArray
+    periods: IntArray
+    upto: IntArray
+    cycles: IntArray
+    modes: IntArray
+    times: FloatArray
+    states: FloatArray
+    last: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch(TileTask):
+    """A task: some values of a sweep, one after the other.
+
+    Attributes
+    ----------
+    model : Model
+    cut, how : the section, and how solutions are followed
+    vectors : parameters at each value, shape (values, parameters)
+    state : where the first starts, shape (n,)
+    """
+
+    model: Model
+    cut: Cut
+    how: Following
+    vectors: FloatArray
+    state: FloatArray
+
+
+def compute_stretch(task: Stretch, stop: IntArray | None = None) -> StretchRows:
+    """Compute a stretch; what it returns depends on nothing but the task."""
+    count = len(task.vectors)
+    free = np.full(count, -1, dtype=np.int64)
+    starts = np.zeros(count), task.state[None], free, np.zeros(count, dtype=np.int64)
+    points, ends = collect(task.model, task.cut, task.how, task.vectors, starts, stop)
+    return StretchRows(
+        ends.outcomes,
+        ends.turns,
+        ends.upto,
+        points.cycles,
+        points.modes,
+        points.times,
+        points.states,
+        ends.states[-1].copy(),
     )

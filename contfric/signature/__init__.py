@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.base.lazy import lazily
-from contfric.signature.edits import double, is_closed_walk, swap_stop, swap_stops
+from contfric.signature.edits import double, is_closed_walk, swap_stops
 from contfric.signature.graph import crossing, successors, transition_graph
 from contfric.signature.library import signature_names, signature_path
 from contfric.signature.notation import Signature, parse_signature
@@ -51,7 +51,6 @@ __all__ = [
     "signature_names",
     "signature_path",
     "successors",
-    "swap_stop",
     "swap_stops",
     "transition_graph",
 ]

@@ -22,7 +22,7 @@ from functools import cache
 
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
-from contfric.models.composed import ComposedModel
+from contfric.models.structure_model import ComposedModel
 from contfric.signature.holds import is_hold, without_holds
 from contfric.signature.reduced import NEVER, ReducedItinerary, ReducedPair, fuses
 
@@ -147,53 +147,31 @@ def concatenate(*itineraries: Sequence[ReducedPair]) -> ReducedItinerary:
     return tuple(pair for itinerary in itineraries for pair in itinerary)
 
 
-def swap_stop(
-    segments: Sequence[ReducedPair], joint: int, exit_surface: str, model: Model
+def swap_stops(
+    segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model
 ) -> ReducedItinerary:
-    """Swap stick and reversal at one stop: the edit of the event CS.
+    """Swap stick and reversal at stops, all at once: the edit of the event CS.
 
     Parameters
     ----------
     segments : sequence of (mode, exit)
         The reduced itinerary, in any rotation. The result keeps it; if the stick is the first segment
-        and ``joint`` the last, the result starts at the second.
-    joint : int
-        Index of the slide that ends at the stop.
-    exit_surface : str
-        The surface that the state meets at the stop: the inserted stick ends there, and a stick
-        that ends elsewhere has no length zero and cannot be removed.
-    model : Model
-        The model that the itinerary is of.
-
-    Raises
-    ------
-    NotationError
-        If there is no stop at the joint, or the graph has no such walk.
-
-    Examples
-    --------
-    >>> from contfric.models import load_model
-    >>> itinerary = (("slide+", "v"), ("slide-", "v"), ("stick", "F-"))
-    >>> swap_stop(itinerary, 0, "F+", load_model("coulomb"))
-    (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
-    """
-    return swap_stops(segments, {joint: exit_surface}, model)
-
-
-def swap_stops(
-    segments: Sequence[ReducedPair], events: Mapping[int, str], model: Model
-) -> ReducedItinerary:
-    """Swap stick and reversal at several stops at once; see :func:`swap_stop`.
-
-    Parameters
-    ----------
+        and its joint the last, the result starts at the second.
     events : mapping of int to str
-        The surface met, for each joint; the indices are those of the itinerary before the edit.
+        For the slide that ends at each stop the surface that is met there: the inserted stick ends there, and
+        a stick that ends elsewhere has no length zero and cannot be removed.
 
     Raises
     ------
     NotationError
         If one of the joints is no stop, or the graph has no such walk.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> itinerary = (("slide+", "v"), ("slide-", "v"), ("stick", "F-"))
+    >>> swap_stops(itinerary, {0: "F+"}, load_model("coulomb"))
+    (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
     """
     return apply_edit(segments, swap_edit(segments, events, model), model)
 

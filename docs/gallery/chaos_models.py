@@ -5,13 +5,16 @@ Everything goes through ``lyapunov_map`` and ``lyapunov_exponent``, as for the m
 
 from __future__ import annotations
 
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
 import contfric as cf
-from contfric.chaos.two_orbits import two_orbit_estimate
+
+sys.path.append(str(Path(__file__).parents[2]))
+from tests.two_orbits import two_orbit_estimate
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE / "chaos-models.md"

@@ -54,7 +54,7 @@ def opening(orbit: cf.Orbit) -> float:
     value = orbit.params["Omega"]
     settings = Settings("Omega", value - 0.1, value + 0.1, "", "", 0.2)
     doubled = orbit.doubled()
-    departure = leave_along(doubled, settings, null_direction(doubled), "", 3e-4)
+    departure = leave_along(doubled, settings, null_direction(doubled), 3e-4)
     assert departure is not None
     return departure.point.value - value
 

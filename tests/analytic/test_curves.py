@@ -103,7 +103,7 @@ def _opening_side(orbit):
     value = orbit.params["Omega"]
     settings = Settings("Omega", value - 0.1, value + 0.1, "", "", 0.2)
     whole = orbit.as_whole()
-    departure = leave_along(whole, settings, null_direction(whole), "")
+    departure = leave_along(whole, settings, null_direction(whole))
     return departure.point.value - value
 
 

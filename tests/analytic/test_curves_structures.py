@@ -436,7 +436,7 @@ def test_autonomous_doubling_changes_its_criticality() -> None:
         value = orbit.params["A"]
         settings = Settings("A", value - 0.1, value + 0.1, "", "", 0.2)
         doubled = orbit.doubled()
-        departure = leave_along(doubled, settings, null_direction(doubled), "", 1e-2)
+        departure = leave_along(doubled, settings, null_direction(doubled), 1e-2)
         assert departure is not None
         sides.append(departure.point.value - value)
     assert sides[0] * sides[1] < 0.0

@@ -21,8 +21,8 @@ import pytest
 from scipy.optimize import brentq
 
 import contfric as cf
-from contfric.chaos.two_orbits import two_orbit_estimate
 from contfric.signature import parse_signature
+from tests.two_orbits import two_orbit_estimate
 
 impact = cf.load_model(Path(__file__).parents[1] / "models" / "moving_wall.yaml")
 

@@ -12,7 +12,7 @@ import pytest
 import contfric as cf
 from contfric import Motion
 from contfric.chaos.exponents import lyapunov_dimension
-from contfric.chaos.two_orbits import two_orbit_estimate
+from tests.two_orbits import two_orbit_estimate
 
 #: Stable orbits, with their names: sticks or none, symmetric or not, one period or two, with and without
 #: damping and third harmonic; and near a fold (0.5419), where the solution settles slowly.

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 import contfric as cf
 from contfric import Motion
-from contfric.chaos.two_orbits import two_orbit_estimate
+from tests.two_orbits import two_orbit_estimate
 
 #: Integrated models from end to end: minutes of processor time, run by `make test-all`.
 pytestmark = pytest.mark.slow

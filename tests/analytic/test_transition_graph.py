@@ -15,7 +15,6 @@ from contfric.signature import (
     reduce_signature,
     reduced_itinerary,
     successors,
-    swap_stop,
     swap_stops,
     transition_graph,
 )
@@ -132,17 +131,17 @@ def test_walk_of_one_mode_is_one_piece() -> None:
 
 def test_crossing_sliding_connects_0s_1a_2s() -> None:
     """CS_s: 0s on one side; 1a, its mirror image and 2s on the other."""
-    one = swap_stop(WORD_0S, 1, "F-", COULOMB)
+    one = swap_stops(WORD_0S, {1: "F-"}, COULOMB)
     assert one == WORD_1A
-    assert swap_stop(WORD_0S, 0, "F+", COULOMB) == mirror_itinerary(WORD_1A, COULOMB)
-    assert swap_stop(one, 0, "F+", COULOMB) == WORD_2S
+    assert swap_stops(WORD_0S, {0: "F+"}, COULOMB) == mirror_itinerary(WORD_1A, COULOMB)
+    assert swap_stops(one, {0: "F+"}, COULOMB) == WORD_2S
     assert swap_stops(WORD_0S, {0: "F+", 1: "F-"}, COULOMB) == WORD_2S
     assert swap_stops(WORD_2S, {0: "F+", 2: "F-"}, COULOMB) == WORD_0S
 
 
 def test_stick_at_the_seam_is_removed() -> None:
     seam = (HELD_LOW, UP, HELD_HIGH, DOWN)
-    assert swap_stop(seam, 3, "F-", COULOMB) == (UP, HELD_HIGH, DOWN)
+    assert swap_stops(seam, {3: "F-"}, COULOMB) == (UP, HELD_HIGH, DOWN)
 
 
 @pytest.mark.parametrize(
@@ -161,7 +160,7 @@ def test_impossible_edits(
     itinerary: tuple[tuple[str, str], ...], joint: int, surface: str, message: str
 ) -> None:
     with pytest.raises(NotationError, match=message):
-        swap_stop(itinerary, joint, surface, COULOMB)
+        swap_stops(itinerary, {joint: surface}, COULOMB)
 
 
 @pytest.mark.parametrize(

@@ -42,8 +42,7 @@ from contfric.plot import (
     save_figure,
 )
 from contfric.plot.events import marks_of
-from contfric.plot.labels import Anchor, lay_out, place_labels
-from contfric.plot.measured import _MEASURE, _UPDATE
+from contfric.plot.labels import _MEASURE, _UPDATE, Anchor, lay_out, place_labels
 from contfric.plot.names import event_label, parameter_label, surface_label
 from contfric.plot.orbit import _columns
 from contfric.plot.pieces import pieces_of

@@ -13,7 +13,7 @@ from numba import types
 
 from contfric.base.sources import package_files
 from contfric.cli import main
-from contfric.cli.bytecode import stale_bytecode, write_bytecode
+from contfric.cli.doctor import stale_bytecode, write_bytecode
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, vector
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle

@@ -19,8 +19,7 @@ import contfric as cf
 from contfric.base.extras import MissingPackageError
 from contfric.cli import main
 from contfric.plot.live import page
-from contfric.plot.live.collect import Detail
-from contfric.plot.live.packed import floats, kept, local_sizes, quantised
+from contfric.plot.live.collect import Detail, floats, kept, local_sizes, quantised
 from contfric.plot.style import ROWS
 
 LARGEST = 2_000_000

@@ -14,7 +14,7 @@ from contfric.continuation.crossing import _ChainProblem, crossing_near
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.side import first_point
-from contfric.continuation.stalls import stalled_at
+from contfric.continuation.vertex_ends import stalled_at
 
 MODEL = Path(__file__).parents[1] / "models" / "crossing.yaml"
 #: The state z of the model obeys z' = mu z + q z^2 - c z^3 + e, whatever the oscillator does, and shifts

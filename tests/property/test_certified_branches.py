@@ -12,8 +12,7 @@ from flint import arb, ctx
 import contfric as cf
 from contfric.certify.branch import certify_branch
 from contfric.certify.chain import Chain, segments_of
-from contfric.certify.phases import in_phases
-from contfric.certify.strand import Strand
+from contfric.certify.strand import Strand, in_phases
 from contfric.certify.tracing import Tracer
 from contfric.certify.tube import Box, box_between, solved
 from contfric.continuation.events import EndReason

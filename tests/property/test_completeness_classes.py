@@ -18,10 +18,9 @@ import contfric as cf
 from contfric.atlas.balance import _solved_at
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.continuation.along_curve import Line
 from contfric.continuation.arms import arms_at
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.doubling_point import _LOCATED, opening
+from contfric.continuation.doubling_point import _LOCATED, Line, opening
 from contfric.continuation.moved_by_errors import duration_error
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import settings_of

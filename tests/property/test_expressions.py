@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from contfric.errors import ModelError
 from contfric.models.build import load_module
-from contfric.models.check.digits import MANY_DIGITS, slopes
+from contfric.models.check.derivatives import MANY_DIGITS, slopes
 from contfric.models.code import printed
 from contfric.models.describe import describe
 from contfric.models.formulas import FORMULAS, formula, kinks_in, vanishes

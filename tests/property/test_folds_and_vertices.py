@@ -21,7 +21,7 @@ from contfric.continuation.points import Point, settings_of
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertex_between import left_at
+from contfric.continuation.vertex_ends import left_at
 from contfric.continuation.vertices import passed_vertex
 from contfric.orbit.simulation import tables
 from contfric.orbit.system import Margin
@@ -187,7 +187,7 @@ def test_a_start_behind_a_doubling_leaps() -> None:
     settings = settings_of(orbit, "A", (62.0, 75.0), None, True, 5000)
     # what is integrated rounds to 1e-13: next to the vertex Newton's method has to know that
     along = null_direction(orbit)
-    start = leave_along(orbit, settings, along, "BP", LEAVE)
+    start = leave_along(orbit, settings, along, LEAVE)
     assert start is not None and not overshoots(orbit, settings, start, LEAVE, along)
     side = trace_side(orbit, start.point, settings)
     (doubling, *_) = [b for b in side.bifurcations if b.kind is cf.Kind.PD]
@@ -195,7 +195,7 @@ def test_a_start_behind_a_doubling_leaps() -> None:
         point = first_point(side.rows.point(k).orbit(orbit, 3), settings)
         assert point is not None
         behind = point.value > doubling.params["A"]
-        assert overshoots(orbit, settings, replace(start, point=point), LEAVE, along) is behind
+        assert overshoots(orbit, settings, start._replace(point=point), LEAVE, along) is behind
     assert behind
 
 
@@ -229,7 +229,7 @@ def test_newton_settles_at_the_rounding_of_an_integrated_flow(distance: float) -
     (event,) = [b for b in branch.bifurcations if b.kind is cf.Kind.BP]
     orbit = event.orbit.as_whole()
     settings = settings_of(orbit, "A", (19.0, 24.0), None, True, 5000)
-    start = leave_along(orbit, settings, null_direction(orbit), "BP", distance)
+    start = leave_along(orbit, settings, null_direction(orbit), distance)
     assert start is not None
     there = start.point.orbit(orbit, 3)
     apart = np.linalg.norm(there.joints - orbit.joints) / len(orbit.joints) ** 0.5

@@ -19,7 +19,7 @@ from contfric.signature import (
     reduce_signature,
     reduced_itinerary,
     successors,
-    swap_stop,
+    swap_stops,
     transition_graph,
 )
 from contfric.signature.cyclic import least_rotation, primitive_length, rotated
@@ -141,10 +141,10 @@ def test_swapping_a_stop_twice_changes_nothing(signature: Signature) -> None:
         if here.sliding or not COULOMB.mode_by_name[following[0]].sliding:
             continue
         try:
-            swapped = swap_stop(itinerary, joint, following[1], COULOMB)
+            swapped = swap_stops(itinerary, {joint: following[1]}, COULOMB)
         except NotationError:
             continue  # the slide cannot reverse into the direction in which the stick is left
         # the stick at the seam was itinerary[0]: its removal moves the joint
         moved = joint - 1 if joint == len(itinerary) - 1 else joint
-        back = swap_stop(swapped, moved, following[1], COULOMB)
+        back = swap_stops(swapped, {moved: following[1]}, COULOMB)
         assert canonical_itinerary(back, COULOMB) == itinerary

@@ -120,7 +120,3 @@ class BallModel:
             else:
                 found += [-dw * (sine + w * t * cosine), dw * (cosine - w * t * sine)]
         return found
-
-
-#: Returns the model at a value of the free parameter (with slopes), or, without one, as it is.
-Builder = Callable[[arb | None], BallModel]

@@ -56,10 +56,9 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_reset_kinks,
         check_two_folds,
     )
-    from contfric.models.check.passages import check_passages
+    from contfric.models.check.passages import check_passages, check_slides
     from contfric.models.check.probe import Probe
     from contfric.models.check.scales import check_reached, check_scales
-    from contfric.models.check.slides import check_slides
     from contfric.models.check.structure import (
         check_angles,
         check_period,

@@ -8,7 +8,7 @@ differences of its own compiled functions, in ordinary numbers.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
@@ -18,11 +18,13 @@ import numpy as np
 
 from contfric.errors import ParameterError
 from contfric.models.build import field_of
-from contfric.models.check.digits import DIGITS, digits, slopes
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import FloatArray, Model
 from contfric.models.describe import from_text
+from contfric.models.description import Description
+from contfric.models.evaluate import Evaluator
+from contfric.models.grammar import UNARY, Algebra
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5
@@ -40,6 +42,21 @@ Formula = Callable[[list[Any]], list[Any]]
 Points = Callable[[str | None], list[FloatArray]]
 #: Fields in many digits that are kept: those at the points of the differences of one mode.
 _KEPT = 256
+#: Enough for differences of differences with 15 good digits.
+DIGITS = 60
+
+MANY_DIGITS: Algebra[Any] = Algebra(
+    number=mpmath.mpf,
+    functions={
+        **{name: getattr(mpmath, name) for name in UNARY if name not in ("abs", "sign")},
+        "abs": abs,
+        "sign": mpmath.sign,
+    },
+    where=lambda d, a, b: a if d > 0 else b,
+    divide=lambda a, b: a / b,
+    power=lambda base, exponent: base**exponent,
+    pi=mpmath.pi,
+)
 
 
 @dataclass(frozen=True)
@@ -301,3 +318,20 @@ class _Described(_Cases):
             return [self.exact.value(texts.get(s, s), *at) for s in self.model.states]
 
         return [Case(f"reset at '{surface}'", self.vector(self.model.flow.reset, k), formula)]
+
+
+def digits(description: Description) -> Evaluator[Any]:
+    """Return a description in many digits; evaluate within ``mpmath.workdps(DIGITS)``."""
+    return Evaluator(description, MANY_DIGITS)
+
+
+def slopes(function: Any, point: list[Any], steps: Sequence[Any]) -> list[list[Any]]:
+    """Return the derivatives of a vector function by differences, one row a value; a step a variable."""
+    columns = []
+    for i, step in enumerate(steps):
+        ahead, behind = list(point), list(point)
+        ahead[i] += step
+        behind[i] -= step
+        up, down = function(ahead), function(behind)
+        columns.append([(a - b) / (2 * step) for a, b in zip(up, down, strict=True)])
+    return [list(row) for row in zip(*columns, strict=True)]

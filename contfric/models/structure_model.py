@@ -7,6 +7,7 @@ a number, and a place in the tables of the flow and of the simulation, when its 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Set
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
@@ -18,8 +19,9 @@ from contfric.models.parts import Domain, FloatArray, Mode, Observable, Surface
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
-    from contfric.models.composition import Composition
-    from contfric.models.growing import GrowingFlow
+    from contfric.models.coded_flow import CodedFlow
+    from contfric.models.description import Description
+    from contfric.models.structure_modes import Composition
 
 #: A domain and a surface through which it is left.
 Exit = tuple[str, str]
@@ -62,7 +64,7 @@ class Sections(Set[Exit]):
 
 
 class ComposedModel(Model):
-    """A model whose modes are made when they are visited (:mod:`contfric.models.composition`).
+    """A model whose modes are made when they are visited (:mod:`contfric.models.structure_modes`).
 
     ``modes`` and ``domains`` are those that were visited, in that order: one domain a mode. Modes in which an
     orbit may stay are divided by the phase (:mod:`contfric.models.phases`), others are not.
@@ -71,7 +73,7 @@ class ComposedModel(Model):
     @cached_property
     def composition(self) -> Composition:
         """What modes are made from."""
-        from contfric.models.composition import composition_of  # other models need none of it
+        from contfric.models.structure_modes import composition_of  # other models need none of it
 
         return composition_of(self.definition)
 
@@ -106,8 +108,8 @@ class ComposedModel(Model):
     def _visit(self, name: str) -> int:
         object.__setattr__(self, "modes", (*self.modes, self.mode_by_name[name]))
         object.__setattr__(self, "domains", (*self.domains, self.domain_by_name[name]))
-        if "_growing" in self.__dict__:
-            self._growing.add(name)
+        if "_coded" in self.__dict__:
+            self._coded.add(self.composition.text(name), self.composition.loads_in(name))
         return len(self.modes) - 1
 
     @cached_property
@@ -141,8 +143,8 @@ class ComposedModel(Model):
             seen = Observable(surface.observable, formula)
             object.__setattr__(self, "observables", (*self.observables, seen))
             self.observable_index[seen.name] = len(self.observables) - 1
-        if "_growing" in self.__dict__:
-            self._growing.see(name)
+        if "_coded" in self.__dict__:
+            self._coded.see(surface, formula)
         place = len(self.surfaces) - 1
         self.surface_index[name], self.surface_by_name[name] = place, surface
         limit = self.composition.limit(name)
@@ -317,16 +319,23 @@ class ComposedModel(Model):
     # ------------------------------------------------------------------------------------- flow
 
     @cached_property
-    def _growing(self) -> GrowingFlow:
-        from contfric.models.growing import GrowingFlow
+    def _coded(self) -> CodedFlow:
+        """The flow of the modes that were visited, in that order: the first is that in which none acts."""
+        from contfric.models.coded import Forms
+        from contfric.models.coded_flow import CodedFlow
+        from contfric.models.describe import from_text
 
-        made = [s.name for s in self.surfaces[len(self.composition.declared) :]]
-        return GrowingFlow(self.definition, [mode.name for mode in self.modes], made)
+        found = CodedFlow(Forms(from_text(self.definition)))
+        for surface in self.surfaces[len(self.composition.declared) :]:
+            found.see(*self.composition.surface(surface.name))
+        for mode in self.modes[1:]:
+            found.add(self.composition.text(mode.name), self.composition.loads_in(mode.name))
+        return found
 
     @cached_property
     def flow(self) -> CompiledFlow:
         """The compiled flow of the modes that were visited; it grows with them."""
-        return self._growing.flow
+        return self._coded.flow
 
     def state_and_rate(
         self, mode: int, t: float, y: FloatArray, vector: FloatArray
@@ -335,11 +344,54 @@ class ComposedModel(Model):
         none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
         state, rate = y.copy(), np.empty(len(y))
         if self.modes[mode].sliding:
-            self._growing.onto(mode, t, y, vector, none, state, nothing)
-        self._growing.field(mode, t, state, vector, none, rate, nothing)
+            self._coded.onto(mode, t, y, vector, none, state, nothing)
+        self._coded.field(mode, t, state, vector, none, rate, nothing)
         return state, rate
 
     @property
     def integrated(self) -> dict[str, str]:
         """Modes that are integrated numerically: none, as a structure is composed of affine ones."""
         return {}
+
+
+def composed_from(description: Description) -> ComposedModel:
+    """Build the model of a structure from its description.
+
+    Raises
+    ------
+    EntryError
+        If its modes are not affine: only these are made one by one.
+    """
+    from contfric.models.derive import as_described, level_of
+    from contfric.models.entries import EntryError
+    from contfric.models.evaluate import Sampler, defaults, floats
+    from contfric.models.not_affine import NotAffineError
+    from contfric.models.regions import ordered_surfaces
+    from contfric.models.structure_modes import composition_of
+
+    composition = composition_of(description.text)
+    try:
+        composition.check()
+    except (NotAffineError, ArithmeticError) as reason:
+        raise EntryError(
+            ("contacts",),
+            "contacts that share their loads, and more than can be listed, need affine forces, and "
+            f"here is {reason}. Four friction contacts (five contacts of three states) or fewer on masses "
+            "of their own may have any law",
+        ) from None
+    params, evaluator = defaults(description), floats(description)
+    sampler = Sampler(evaluator, params)
+    levels = {s.name: level_of(evaluator, s, params) for s in description.surfaces}
+    surfaces = [
+        replace(s, switching=s.name in composition.switching)
+        for s in ordered_surfaces(description, levels)
+    ]
+    quiet = description.modes[0].name
+    return ComposedModel(
+        **as_described(description, sampler, surfaces),
+        modes=(composition.mode(quiet),),
+        domains=(composition.domain(quiet),),
+        departures=(),
+        filippov=composition.leaves_at_rest,
+        phase=description.phase,
+    )

@@ -13,8 +13,8 @@ ways through a surface    (what else holds where it is met, mode that follows): 
                           elements along one direction stop at once. One way only for everything else
 ========================  =================================================================================
 
-The engine's numbers of modes (:class:`contfric.models.composed.ComposedModel`) are given in the order of the
-first visit; itineraries and signatures have the names.
+The engine's numbers of modes (:class:`contfric.models.structure_model.ComposedModel`) are given in the order
+of the first visit; itineraries and signatures have the names.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from contfric.models.description import ModeText
 from contfric.models.entries import SIDES, Part
 from contfric.models.made import Made
 from contfric.models.parts import Domain, Mode, Surface
-from contfric.models.phase_parts import PART, PhaseParts
+from contfric.models.phases import PART, PhaseParts
 from contfric.models.shared_loads import Limit, Setting, load_name, suffix
 from contfric.models.shared_ways import Place, SharedWays
 from contfric.models.structure import Structure
@@ -201,9 +201,7 @@ class Composition:
         forms = Forms(self._description)
         for letter in range(max(len(c.states) for c in self.acting)):
             name = "".join(c.states[min(letter, len(c.states) - 1)] for c in self.acting)
-            for load, text in self.loads_in(name).items():
-                forms.name(load, text)
-            forms.add(self.text(name))
+            forms.add(self.text(name), self.loads_in(name))
 
     # --------------------------------------------------------------------------- what follows
 

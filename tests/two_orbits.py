@@ -1,4 +1,4 @@
-"""The two-orbit estimate of the largest exponent: a cross-check of the tangent map, nothing else uses it.
+"""The two-orbit estimate of the largest exponent: a cross-check of the tangent map.
 
 Two motions start a small distance d_0 apart, and the logarithm of their distance in state space is compared
 at later instants, eq. (5) of the reference. As there, an instant at which either is at rest is passed over
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.chaos.rows import check_excited
-from contfric.errors import ContfricError, ParameterError, real_number, whole_number
+from contfric.errors import ContfricError
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
@@ -82,11 +82,6 @@ def two_orbit_estimate(
     ----------
     distance : the distance d_0; 1e-8, the square root of rounding, balances curvature and rounding
 
-    Raises
-    ------
-    ParameterError
-        If an argument is not valid.
-
     Examples
     --------
     >>> params = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
@@ -94,10 +89,6 @@ def two_orbit_estimate(
     -0.03
     """
     model, params = tied(model, params)
-    whole_number("periods", periods, least=_BATCHES)
-    distance = real_number("distance", distance)
-    if not 0.0 < distance < 1.0:
-        raise ParameterError(f"distance is a number between 0 and 1, got {distance!r}")
     vector = model.vector(params)
     check_excited(model, vector)
     begun = simulate(model, params, state=state, time=time, periods=transient)
