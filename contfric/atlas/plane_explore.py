@@ -59,8 +59,6 @@ _BROKEN_OFF = {
     CurveEndReason.BROKEN,
     CurveEndReason.INTERRUPTED,
 }
-#: Distance from a physical limit (relative to the ranges) within which it cannot be told from what meets it.
-_AT_LIMIT = 1e-6
 #: A region smaller than this share of the plane gets no section of its own.
 _SMALL = 2e-4
 
@@ -239,7 +237,7 @@ def _follow_special(state: PlaneExploration) -> None:
     _follow_itineraries(state)
     while state.waiting:
         special, problem = state.waiting.popleft()
-        if _is_at_limit(special, problem):
+        if problem.at_limit(np.array([special.params[name] for name in problem.box.names])):
             continue
         if special.meets is Kind.T or special.kind in (CodimTwo.CUSP, CodimTwo.R1, CodimTwo.R2):
             continue
@@ -252,12 +250,6 @@ def _follow_special(state: PlaneExploration) -> None:
             if state.wants(starts[0][0]):
                 _follow_starts(state, starts, special)
         _follow_itineraries(state)
-
-
-def _is_at_limit(special: SpecialPoint, problem: Problem) -> bool:
-    """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
-    here = np.array([[special.params[name] for name in problem.box.names]])
-    return bool(problem.within_limits(here)[0] < _AT_LIMIT * np.min(problem.box.widths))
 
 
 @remembered()

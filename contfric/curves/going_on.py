@@ -17,6 +17,7 @@ from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, PointRows
+from contfric.curves.meeting import has_multiplier
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Problem, problem_of, tangency
@@ -210,7 +211,8 @@ def prove(
         others = np.ones(len(margins), dtype=np.bool_)
         others[still] = False
         lasts = bool(np.all(orbit.durations > -_NO_TIME))
-        if not lasts or not np.all(margins[others] > 0.0) or _is_exit(problem, still):
+        fine = lasts and bool(np.all(margins[others] > 0.0)) and has_multiplier(problem, orbit)
+        if not fine or _is_exit(problem, still):
             continue
         if not born and is_continuum(problem, start) and is_continuum(problem, beside):
             return None

@@ -28,6 +28,11 @@ _RESOLUTION = 4e-16
 _ROUNDING = float(np.finfo(float).eps)
 #: Values below this are rounding: a narrower bracket would follow noise.
 _NOISE = 2e-15
+#: Share of the way to a location after which another bracket begins: some other place.
+_SHORTER = 0.38
+#: Locations of two brackets that agree to this share of the ranges are one: where Newton's method is regular
+#: they do to 1e-12, where it is singular to the root of rounding.
+_SAME_LOCATION = 1e-10
 
 Value = Callable[[Point], float]
 
@@ -85,6 +90,26 @@ def locate(
     compiled = compiled_problem(problem)
     status, _ = locate_on_curve(compiled, border.copy(), sought, rows.arrays(), tally())
     return (a, False) if status < 0 else (rows.point(3), status == 1)
+
+
+def locate_twice(
+    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
+) -> tuple[Point, bool]:
+    """Return the location of a change, and whether another bracket finds it at the same parameters.
+
+    Where another curve of the same condition passes through, or conditions degenerate, Newton's method is
+    singular: each bracket closes to its last digits, and each somewhere else.
+    """
+    point, fine = locate(problem, a, b, border, sought)
+    if not fine or not a.arc < point.arc < b.arc:
+        return point, fine
+    share = _SHORTER * (point.arc - a.arc) / (b.arc - a.arc)
+    start = point_between(problem, a, b, share, border)
+    if start is None:
+        return point, False
+    again, fine = locate(problem, start, b, border, sought)
+    gap = float(np.max(np.abs(again.w - point.w) / problem.box.widths))
+    return point, fine and gap < _SAME_LOCATION
 
 
 def by_test(index: int) -> Sought:

@@ -10,7 +10,8 @@ import numpy as np
 from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point
-from contfric.curves.locating import by_label, by_test, locate
+from contfric.curves.locating import by_label, by_test, locate, locate_twice
+from contfric.curves.meeting import at_once
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.models.definition import FloatArray
@@ -63,11 +64,12 @@ def _margins(
     located = []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate(problem, before, after, border, by_test(index))
+        point, fine = locate_twice(problem, before, after, border, by_test(index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
     _, first, point, fine = min(located, key=lambda entry: entry[0])
+    point, fine = at_once(problem, point, fine, tests[first])
     orbit = problem.orbit(point.joints, point.w)
     kind = kind_of_margin(problem.system, tests[first], orbit)
     group = tuple(
@@ -105,6 +107,7 @@ def _special(
         name = f"{problem.kind.value}-{meets.value}"
     if kind is CodimTwo.TURNOVER:
         name = "CS-SS"
+    located = located and not problem.at_limit(point.w)
     return SpecialPoint(kind, name, orbit.params, orbit, meets, tests, point.arc, located)
 
 
@@ -119,7 +122,7 @@ def _smooth(
         a, b = before.tests[index], after.tests[index]
         if not a * b < 0.0 or max(abs(a), abs(b)) < MARGINAL:
             continue
-        point, fine = locate(problem, before, after, border, by_test(index))
+        point, fine = locate_twice(problem, before, after, border, by_test(index))
         value = abs(point.tests[index])
         if not math.isfinite(value) or value > max(0.5 * min(abs(a), abs(b)), MARGINAL):
             continue  # it changes sign through infinity: an exit that becomes tangential

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
 #: events are zero to about 1e-12, and those of a group agree to their conditioning.
 _VANISHES = 1e-6
+#: Distance from a physical limit (relative to the ranges) within which it cannot be told from what meets it.
+_AT_LIMIT = 1e-6
 #: A multiplier this far from +-1 does not belong to a located bifurcation.
 _MULTIPLIER = 1e-2
 
@@ -80,6 +82,10 @@ class Problem:
         if not len(self.limits):
             return np.full(len(values), np.inf)
         return np.asarray(np.min(values @ self.limits[:, :2].T + self.limits[:, 2], axis=1))
+
+    def at_limit(self, w: FloatArray) -> bool:
+        """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
+        return bool(self.within_limits(w[None, :])[0] < _AT_LIMIT * np.min(self.box.widths))
 
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""

@@ -73,7 +73,8 @@ class SpecialPoint(Shown):
     position : float
         Arclength on the curve.
     located : bool
-        False if the test changed sign but the location could not be bracketed to its last digits.
+        False where conditions degenerate: another bracket of the change of sign closes somewhere else,
+        Newton's method fails there, or it is a physical limit.
     """
 
     kind: CodimTwo
