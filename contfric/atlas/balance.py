@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 #: Points this near to an event (in accuracies of its place) are on no side of it.
 _BESIDE = 10.0
+#: Arclength from an event, in sizes of the orbit, within which multipliers next to 1 may be rounding: a few
+#: times the cube root of it, up to which a point next to the vertex of a pitchfork is blurred.
+_BLURRED = 1e-4
 #: Values of the parameter between two neighbouring events at which indices are summed.
 _SHARES = (0.381966, 0.618034)
 #: Events nearer than this share of the range have nothing between them that could be told from them.
@@ -287,7 +290,9 @@ def _beside(
     between = ((branch.arc - position) * way > 0.0) & ((reach - branch.arc) * way > 0.0)
     far = between & (np.abs(branch.values - value) > slack)
     if np.any(far):
-        k = int(min(np.flatnonzero(far), key=lambda j: abs(branch.arc[j] - position)))
+        away = np.abs(branch.arc - position)
+        told = far & (away > _BLURRED * (1.0 + float(np.abs(branch[0].joints[:, 1:]).max())))
+        k = int(min(np.flatnonzero(told if np.any(told) else far), key=away.__getitem__))
         return int(np.sign(branch.values[k] - value)), branch[k]
     if following is None or is_short(branch):
         return None

@@ -52,6 +52,9 @@ _CROSSES = 1e-8
 _TURNS = 1e-6
 #: Share of a step by which a branch point may lie outside of it: a change of sign at its very end.
 _BESIDE = 1e-3
+#: The same, where the step is short, in cube roots of rounding r and sizes of the orbit. At a distance x from
+#: where a curve turns an error r moves the parameter by r/x and the slope, of order x, by r/x^2.
+_BLURRED = 5.0
 #: A located branch point is good to far less than this (scaled product).
 LOCATED = 1e-5
 
@@ -248,8 +251,9 @@ def crossing_between(
     )
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
-    here = near.orbit(orbit, active)
-    crossing = crossing_near(here, settings, 2.0 * float(np.sqrt(square)))
+    step, here = float(np.sqrt(square)), near.orbit(orbit, active)
+    beside = _BESIDE * step + _blur(near, orbit.model.rounding)
+    crossing = crossing_near(here, settings, 2.0 * (step + beside))
     if crossing is None:
         return None
     way = (
@@ -257,11 +261,17 @@ def crossing_between(
         float(crossing.orbit.vector[active]) - before.value,
     )
     at = _product(chord, way, settings.scale) / square
-    far = _product(way, way, settings.scale) > (1.0 + _BESIDE) * square
-    if far or not -_BESIDE < at < 1.0 + _BESIDE:
+    far = np.sqrt(_product(way, way, settings.scale)) > step + beside
+    if far or not -beside < at * step < step + beside:
         return None
     arc = min(1.0, max(0.0, at)) * (after.arc - before.arc)
     return crossing, crossing_point(crossing, before, arc, settings)
+
+
+def _blur(point: Point, rounding: float) -> float:
+    """Return how far from a branch point the sign of a slope is rounding (scaled product)."""
+    size = 1.0 + float(np.abs(point.joints[:, 1:]).max(initial=0.0))
+    return _BLURRED * size * float(np.cbrt(max(rounding, _LEAST_ROUNDING)))
 
 
 def crossing_point(crossing: Crossing, before: Point, arc: float, settings: Settings) -> Point:

@@ -235,9 +235,10 @@ class _Collection:
 def vanishing(orbit: Orbit, least: float) -> list[tuple[EventFunction, Kind]]:
     """Return the locations of a whole orbit whose margins vanish, with the kind of each; no tangencies."""
     found: dict[EventFunction, Kind] = {}
-    widest, margins = max(least, TANGENTIAL), orbit.margins.tolist()
-    for test, value in zip(orbit.system.tests, margins, strict=True):
-        if not (abs(value) < widest and (abs(value) < least or not is_linear(test, orbit))):
+    widest, sizes = max(least, TANGENTIAL), margin_sizes(orbit)
+    for test, margin, size in zip(orbit.system.tests, orbit.margins.tolist(), sizes, strict=True):
+        value = abs(margin) / size
+        if not (value < widest and (value < least or not is_linear(test, orbit))):
             continue
         kind = kind_of_margin(orbit.system, test, orbit)
         if kind is not Kind.T:
@@ -245,6 +246,24 @@ def vanishing(orbit: Orbit, least: float) -> list[tuple[EventFunction, Kind]]:
     for location in _vanished(orbit):
         found.setdefault(location, Kind.GS)
     return list(found.items())
+
+
+def margin_sizes(orbit: Orbit) -> list[float]:
+    """Return what each margin of an orbit is small against: of a height, the largest one over its surface.
+
+    Heights have units, so that a height in metres may be a millionth of that in micrometres.
+    """
+    heights: dict[str, float] = {}
+    sizes = []
+    for test in orbit.system.tests:
+        if test.margin not in (Margin.JOINT, Margin.INTERIOR):
+            sizes.append(1.0)
+            continue
+        if test.surface not in heights:
+            values = [orbit.flow.height(test.surface, float(e[0]), e[1:]) for e in orbit.ends]
+            heights[test.surface] = max(map(abs, values), default=0.0) or 1.0
+        sizes.append(heights[test.surface])
+    return sizes
 
 
 def is_linear(test: EventFunction, orbit: Orbit) -> bool:

@@ -39,6 +39,7 @@ from contfric.continuation.touching import (
     chosen_at,
     is_corner,
     rate_along,
+    rate_scale,
     rest_at,
     resting_domain,
     thrown_at,
@@ -53,8 +54,8 @@ from contfric.signature.holds import ends_rest
 #: A slide after a hold that is this short has vanished where one of its margins has: they are its length
 #: times a rate of the load, and Newton may fail before they are below 1e-5.
 _VANISHED = 1e-3
-#: A load that changes this slowly at a stop stands still there: a stop at a minimum is known to the root of
-#: rounding. Where it changes faster, a stick as short as its rate still ends in a jump.
+#: A load that changes this slowly at a stop, against how fast it may, stands still there: a stop at a minimum
+#: is known to the root of rounding. Where it is faster, a stick as short as its rate still ends in a jump.
 ROUNDED = 1e-6
 #: Time, in periods, by which it is asked before and after a stop whether it turns there.
 _LATER = 1e-4
@@ -154,10 +155,14 @@ def _leaves(resting: Domain, test: EventFunction, orbit: Orbit) -> bool:
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
     """
     rate = outward_rate(resting, test, orbit)
-    if abs(rate) >= ROUNDED:
+    if not _stands_still(rate, resting, test, orbit):
         return rate > 0.0
     sign, end = resting.signs[test.surface], orbit.ends[test.segment]
     return bends_outward(orbit, resting.mode, test.surface, sign, end)
+
+
+def _stands_still(rate: float, resting: Domain, test: EventFunction, orbit: Orbit) -> bool:
+    return abs(rate) <= ROUNDED * rate_scale(orbit, resting.mode, test.surface)
 
 
 def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
@@ -166,7 +171,9 @@ def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
     Where it does not depend on time (a spring's) it stands still all through a rest, and releases nothing.
     """
     resting = rest_at(test, orbit)
-    if resting is None or abs(outward_rate(resting, test, orbit)) >= ROUNDED:
+    if resting is None:
+        return False
+    if not _stands_still(outward_rate(resting, test, orbit), resting, test, orbit):
         return False
     end = orbit.ends[test.segment]
     rates = _rates_beside(orbit, resting.mode, test.surface, end)

@@ -64,6 +64,9 @@ _MOST_MISS = 0.3
 _BLUR = 1e-8
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
+#: Times of joints are unknowns like states. In a turn longer than this they are far larger than these, as in
+#: units of time that are short, and arclength is theirs: steps are as long as that.
+_LONG = 50.0
 #: A turn this long (nondimensional) of an autonomous model is on its way to an infinite one.
 _ENDLESS = 1e4
 
@@ -101,10 +104,10 @@ def accepted_share(way, points, k, length, step):  # type: ignore[no-untyped-def
 def following_step(way, z, angle, step, largest):  # type: ignore[no-untyped-def]
     """Return the step after an accepted point, from the angle between its tangent and the last one."""
     factor = min(_GROWTH, max(0.4, _WANTED_ANGLE / max(angle, 1e-6)))
-    size = largest_state(z)
+    size, turn = largest_state(z), way.workspace.equations.last[0] - z[0, 0]
     if way.layout.turn == 0.0:  # the duration is one of the unknowns
         size = max(size, -z[0, 0])
-    return min(largest * (1.0 + size), step * factor)
+    return min(largest * (1.0 + max(size, turn / _LONG)), step * factor)
 
 
 def trying(correct_at: Any, observe_at: Any) -> Any:

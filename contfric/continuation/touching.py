@@ -22,10 +22,13 @@ if TYPE_CHECKING:
 
 #: A rate this small, at a joint on a section that is a rate itself, is rounding.
 _TANGENTIAL = 1e-9
-#: A surface that is met faster than this is passed: a graze is located to the root of rounding.
+#: A surface that is met faster than this, against how fast it may be met, is passed: a graze is located to
+#: the root of rounding.
 _PASSED = 1e-4
 #: A state this far beyond a surface is not inside: an event at a corner is located to the root of rounding.
 _OUTSIDE = 1e-6
+#: Phases of the excitation at which the rate of an observable is asked for how large it becomes.
+_PHASES = 4
 #: Random states by which two functions are compared.
 _STATES = 6
 
@@ -51,8 +54,7 @@ def touched_at_joint(test: EventFunction, orbit: Orbit, resting: Domain | None) 
     if exit_ not in model.surface_by_name or resting is not None:
         return None
     for touched, other in ((test.surface, exit_), (exit_, test.surface)):
-        slow = abs(rate_along(orbit, mode, touched, end)) < _PASSED
-        if slow and is_rate_of(model, mode, touched, other):
+        if is_rate_of(model, mode, touched, other) and not is_passed(orbit, mode, touched, end):
             return touched
     return None
 
@@ -62,7 +64,13 @@ def is_corner(system: System, test: EventFunction, orbit: Orbit) -> bool:
     if test.margin is not Margin.JOINT:
         return False
     mode, _ = system.itinerary[test.segment]
-    return abs(rate_along(orbit, mode, test.surface, orbit.ends[test.segment])) > _PASSED
+    return is_passed(orbit, mode, test.surface, orbit.ends[test.segment])
+
+
+def is_passed(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> bool:
+    """Tell whether a surface is met with a speed at a joint (t, y): it is not only touched."""
+    rate = abs(rate_along(orbit, mode, surface, joint))
+    return rate > _PASSED * rate_scale(orbit, mode, surface)
 
 
 def resting_domain(system: System, test: EventFunction) -> Domain | None:
@@ -152,6 +160,23 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
     return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])
 
 
+def rate_scale(orbit: Orbit, mode: str, surface: str) -> float:
+    """Return how fast a surface's observable changes in a mode along an orbit: what its rates are small to.
+
+    The largest rate at the joints, and at their states at other phases of the excitation, or the height over
+    the surface in a period.
+    """
+    shifts = np.arange(_PHASES) / _PHASES * (0.0 if orbit.model.autonomous else orbit.period)
+    largest = 0.0
+    for joint in orbit.ends:
+        height = orbit.flow.height(surface, float(joint[0]), joint[1:])
+        largest = max(largest, abs(height) / orbit.period)
+        for shift in shifts.tolist():
+            later = np.concatenate([[joint[0] + shift], joint[1:]])
+            largest = max(largest, abs(rate_along(orbit, mode, surface, later)))
+    return largest
+
+
 def chosen_at(system: System, test: EventFunction) -> str:
     """Return the surface of the reset that chooses the mode after it by the side of a test; else nothing."""
     joint = test.segment if test.margin is Margin.JOINT else test.segment - 1
@@ -233,7 +258,7 @@ def _kicked_again(orbit: Orbit, test: EventFunction) -> str:
         return ""
     t, y = float(orbit.begins[i, 0]), orbit.begins[i, 1:]
     own = orbit.itinerary[i][0]
-    if abs(rate_along(orbit, own, surface, orbit.begins[i])) > _PASSED:
+    if is_passed(orbit, own, surface, orbit.begins[i]):
         return ""
     side = 1 if second_rate(orbit, own, surface, t, y) > 0.0 else -1
     first = [model.domain_by_name[name] for name in sorted(reset.ways)]

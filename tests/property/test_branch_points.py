@@ -63,6 +63,29 @@ def test_a_hidden_symmetry_gives_the_diagram_of_the_declared_one(start: float) -
         assert sum(gap < 1e-9 for gap in gaps) == twice, event
 
 
+def symmetric_place() -> float:
+    """Return where the pitchfork is that the model with its symmetry declared has."""
+    events = symmetric_diagram().bifurcations
+    return next(float(b.params["Omega"]) for b in events if b.kind is cf.Kind.BP)
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 2, 3))])
+def test_no_step_passes_the_vertex_of_a_pitchfork(seed: int) -> None:
+    """Next to it the sign of a slope is rounding: one curve in eight went on along the mirror branch."""
+    rng = np.random.default_rng([31, seed])
+    shift = float(rng.uniform(-0.1, 0.1))
+    params = {"Sp": 0.25 - shift, "Sm": 0.25 + shift, "Sp0": 0.35 - shift, "Sm0": 0.35 + shift}
+    orbit = cf.find_orbit(MODEL, params | {"Omega": float(rng.uniform(0.425, 0.435))})
+    assert min(abs(orbit.multipliers - 1.0)) > 1e-3
+    for _ in range(12):
+        low, step = float(rng.uniform(0.3, 0.41)), float(10.0 ** rng.uniform(-2.3, -1.0))
+        branch = cf.continue_orbit(orbit, "Omega", (low, 0.8), max_step=step)
+        kinds = sorted(b.kind.name for b in branch.bifurcations if b.kind is not cf.Kind.T)
+        assert kinds == ["BP", "SS"], (low, step)
+        place = next(b for b in branch.bifurcations if b.kind is cf.Kind.BP).params["Omega"]
+        assert place == pytest.approx(symmetric_place(), abs=1e-9)
+
+
 @pytest.mark.parametrize(
     "terms, place, branches",
     [
