@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.models.definition import FloatArray
 from contfric.orbit.linear import equations_at, null_space
 from contfric.orbit.orbit import Orbit
 
@@ -84,9 +85,15 @@ def is_continuum(branch: Branch) -> bool:
 
     Its folds are asked, too: the points of a short bridge may all be near its ends, at one value.
     """
-    _, values, _ = branch.nodes
-    largest = float(np.abs(values).max())
-    return bool(branch.arc[-1] > _LENGTH and np.ptp(values) < _ONE_VALUE * (1.0 + largest))
+    return (
+        branch.arc[-1] > _LENGTH and _at_one_value(branch.values) and _at_one_value(branch.nodes[1])
+    )
+
+
+def _at_one_value(values: FloatArray) -> bool:
+    """Tell whether values differ by what they are solved to."""
+    low, high = float(values.min()), float(values.max())
+    return high - low < _ONE_VALUE * (1.0 + max(-low, high))
 
 
 def continua_of(branch: Branch) -> Iterator[str]:

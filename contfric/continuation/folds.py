@@ -94,11 +94,13 @@ def fold_at(
     split = as_split(vertex[0], point.tangent)
     if split is not None:
         return [(split, point)]
-    # of a bridge nothing but the parameter tells a fold
-    known = vertex[0].accuracy * settings.width if settings.stability else 0.0
-    vertical = not _turns(before, point, after, known) and _is_vertical(before, after, settings)
-    vertical = vertical or _is_jump(before, point, after)
-    return [] if vertical or _is_idle(orbit, before, point, after, settings) else [vertex]
+    if _is_jump(before, point, after) or _is_idle(orbit, before, point, after, settings):
+        return []
+    if _is_vertical(before, after, settings):
+        # of a bridge nothing but the parameter tells a fold
+        known = vertex[0].accuracy * settings.width if settings.stability else 0.0
+        return [vertex] if _turns(before, point, after, known) else []
+    return [vertex]
 
 
 def crossing_in(

@@ -106,9 +106,10 @@ def _left_by_jump(before: Point, point: Point, first: int, turn: float) -> float
     slide is as short as it is known to (its cube root of rounding) every step may go to another curve.
     """
     left, times = float(point.tests[first]), before.joints[:, 0]
-    jumps = not point.lost and left > max(_REACHED, _JUMPS * float(before.tests[first]))
+    if point.lost or left <= max(_REACHED, _JUMPS * float(before.tests[first])):
+        return 0.0
     lasts = float(np.diff(times, append=times[0] + turn).min())
-    return left if jumps and lasts > _KNOWN * turn else 0.0
+    return left if lasts > _KNOWN * turn else 0.0
 
 
 def _first_located(

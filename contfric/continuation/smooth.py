@@ -209,7 +209,7 @@ def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -
     At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.
     """
     found: list[Located] = []
-    for k in np.flatnonzero(before.labels != after.labels).tolist():
+    for k in (before.labels != after.labels).nonzero()[0].tolist():
         found += _changes(orbit, before, after, settings, k)
     found += _undone(orbit, before, after, settings, found)
     return _once(found) if orbit.model.joined else found
@@ -229,9 +229,9 @@ def _changes(
     ):
         found.append(not_located(orbit, Kind.T, before, after, settings))
     for point in locations:
-        here = point.orbit(orbit, active)
-        if here.margins.min(initial=0.0) < -_OUTSIDE:
+        if point.tests[: len(orbit.system.tests)].min(initial=0.0) < -_OUTSIDE:
             continue  # where curves cross a trial may lie on another one
+        here = point.orbit(orbit, active)
         test = EventFunction(*_label_location(orbit, k))
         b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
         found.append((b, point))
