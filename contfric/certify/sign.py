@@ -194,11 +194,13 @@ def positive(
         level, index = waiting.pop()
         found = shown(level, index)
         if found is False:
-            return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
+            return Finding(Verdict.REFUTED, f"violated at {_share(level, index)} of its duration")
         if found:
             continue
         if level >= _NARROW:
-            return Finding(Verdict.UNDECIDED, f"no sign after {_share(level, index)} of it")
+            return Finding(
+                Verdict.UNDECIDED, f"not decided at {_share(level, index)} of its duration"
+            )
         waiting += [(level + 1, 2 * index + 1), (level + 1, 2 * index)]
     return Finding(Verdict.UNDECIDED, "the segment needs too many pieces")
 
