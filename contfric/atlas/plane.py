@@ -61,7 +61,7 @@ class Region(Shown):
 
     def __repr__(self) -> str:
         where = ", ".join(f"{k}={v:.4g}" for k, v in self.point.items())
-        lives = ", ".join(map(str, self.families)) or ("nothing" if self.sampled else "not sampled")
+        lives = "; ".join(map(str, self.families)) or ("nothing" if self.sampled else "not sampled")
         return f"<Region at {where}, {100.0 * self.share:.2g} %: {lives}>"
 
 

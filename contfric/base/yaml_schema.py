@@ -144,7 +144,8 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
     part, key, info = _described(schema, address)
     if entry["type"] in _UNKNOWN:
         unknown = str(address[-1])
-        hint = comma_hint(unknown, given) or did_you_mean(unknown, _fields(part))
+        hint = comma_hint(unknown, given) or _belongs(unknown, part)
+        hint = hint or did_you_mean(unknown, _fields(part))
         return f"unknown key '{unknown}'{hint}"
     wanted = info.description if info else "as the guide says"
     if entry["type"] == "missing":
@@ -157,6 +158,17 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
     if last != key and isinstance(extra, dict) and "entry" in extra:
         return f"{str(extra['entry']).format(last)}, got {_given(given)}"
     return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{_given(given)}"
+
+
+def _belongs(unknown: str, part: type[BaseModel]) -> str:
+    """Return which keys of a part a key belongs into that the part itself does not have; empty if none."""
+    below = {key: _kinds(info.annotation, BaseModel) for key, info in _fields(part).items()}
+    homes = [key for key, kinds in below.items() if any(unknown in _fields(kind) for kind in kinds)]
+    return (
+        f" here: it belongs into {', '.join(homes[:-1])}{' or ' * (len(homes) > 1)}{homes[-1]}"
+        if homes
+        else ""
+    )
 
 
 def _given(value: object) -> str:

@@ -41,7 +41,7 @@ _COUNTED: tuple[tuple[str, set[str], Callable[[Piece], int]], ...] = (
 )
 _MISSED = {
     "folds": "a fold may be there",
-    "flips": "a multiplier -1 of a turn may be there",
+    "flips": "a multiplier -1 may be there",
     "tori": "a pair of multipliers may be on the unit circle",
 }
 #: Reasons of ends that are events.
@@ -180,6 +180,19 @@ class BranchCertificate(Shown):
             f"<Certificate of {self.branch!r}: {'proved' if self.proved else 'not whole'}, "
             f"{100 * self.covered:.4g} % of the arclength, {len(self.pieces)} boxes>"
         )
+
+
+def latest(time_limit: float | None) -> float:
+    """Return when to end, by ``time.time``, for a limit in seconds from now.
+
+    Raises
+    ------
+    ParameterError
+        If the limit is not positive.
+    """
+    if time_limit is not None and not time_limit > 0:
+        raise ParameterError(f"time_limit is a number of seconds above 0, got {time_limit}")
+    return math.inf if time_limit is None else time.time() + time_limit
 
 
 def certify_branch(

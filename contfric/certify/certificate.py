@@ -121,7 +121,8 @@ class Certificate(Shown):
             )
         if self.enclosure:
             lines.append(f"  enclosure    joints known to {self.width:.1e}, {self.precision} bits")
-        lines += [f"  multiplier   {mu.str(12)} (of one turn)" for mu in self.multipliers]
+        half = " (of the half-period map)" if self.orbit.system.half else ""
+        lines += [f"  multiplier   {mu.str(12)}{half}" for mu in self.multipliers]
         return "\n".join(lines)
 
 

@@ -16,11 +16,13 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations
 
-from flint import arb_mat
+import numpy as np
+from flint import acb, acb_mat, arb, arb_mat
 
 from contfric.certify.bounds import regular_along
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
+from contfric.certify.monodromy import monodromy
 from contfric.certify.multipliers import dimension, poincare_map
 from contfric.certify.tube import Box
 from contfric.certify.zeros import Closing, zeros_at_joints
@@ -30,6 +32,8 @@ from contfric.models.balls.numbers import Vector
 _PARTS = 16
 #: Largest maps whose compound is computed: 66 minors.
 _LARGEST = 12
+#: Steps towards the vector of Perron, any of which will do for a proof, and what keeps it positive.
+_POWERS, _SMALL = 8, 1e-3
 
 
 def has_no_pair(segments: Segments, build: Builder, closing: Closing, box: Box) -> bool:
@@ -52,7 +56,10 @@ def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> b
     joints = chain.joints(x[:-1])
     if dimension(chain, joints, known) < 2:  # also up to a tangential stop
         return True
-    found = poincare_map(chain, joints, known)
+    if segments.turn != 0.0:
+        found = monodromy(chain, joints)
+    else:  # where a multiplier 1 belongs to each orbit, which the Poincare map does not have
+        found = poincare_map(chain, joints, known)
     return found is not None and no_pair(found)
 
 
@@ -74,6 +81,8 @@ def no_pair(matrix: arb_mat) -> bool:
     if size == 2:
         trace, det = matrix[0, 0] + matrix[1, 1], matrix.det()
         return not (det - 1).contains(0) or bool(trace * trace - 4 * det > 0)
+    if _avoids_circle(matrix):
+        return True
     pairs = list(combinations(range(size), 2))
     compound = arb_mat(
         [
@@ -86,3 +95,34 @@ def no_pair(matrix: arb_mat) -> bool:
     )
     nothing = arb_mat(len(pairs), len(pairs))
     return regular_along([compound, nothing, nothing], 0.0)
+
+
+def _avoids_circle(matrix: arb_mat) -> bool:
+    """Tell whether no eigenvalue is on the unit circle, by discs about those of the middle (Gershgorin).
+
+    The discs are scaled by about the vector of Perron of their radii, each over its way to the circle.
+    """
+    size = matrix.nrows()
+    middle = np.array([[float(x.mid()) for x in row] for row in matrix.tolist()])
+    if not np.all(np.isfinite(middle)):
+        return False
+    basis = acb_mat(
+        [[acb(x.real, x.imag) for x in row] for row in np.linalg.eig(middle)[1].tolist()]
+    )
+    try:
+        rows = (basis.inv() * acb_mat(matrix) * basis).tolist()
+    except ZeroDivisionError:  # the eigenvectors of the middle do not span the space
+        return False
+    ways = np.array([float(abs(abs(rows[i][i]) - 1).abs_lower()) for i in range(size)])
+    reach = np.array([[float(abs(x).abs_upper()) for x in row] for row in rows])
+    np.fill_diagonal(reach, 0.0)
+    if not (np.all(ways > 0.0) and np.all(np.isfinite(reach))):
+        return False
+    scale = np.ones(size)
+    for _ in range(_POWERS):
+        scale = reach @ scale / ways
+        scale = scale / np.max(scale) + _SMALL
+    sums = [
+        sum((arb(r) * arb(x) for r, x in zip(row, scale, strict=True)), arb(0)) for row in reach
+    ]
+    return all(bool(total < arb(w) * arb(x)) for total, w, x in zip(sums, ways, scale, strict=True))

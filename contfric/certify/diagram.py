@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from contfric.atlas.diagram import Diagram
-from contfric.certify.branch import BranchCertificate, certify_branch
+from contfric.certify.branch import BranchCertificate, certify_branch, latest
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -29,7 +29,6 @@ from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation
-from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 
 _INTERRUPTED = "interrupted"
@@ -58,10 +57,7 @@ def certify_diagram(
         If proofs are not offered for the model, or the time limit is not positive.
     """
     check_executor(executor)
-    if time_limit is not None and not time_limit > 0:
-        raise ParameterError(f"time_limit is a number of seconds above 0, got {time_limit}")
-    began = time.time()
-    until = math.inf if time_limit is None else began + time_limit
+    began, until = time.time(), latest(time_limit)
     branches = [(i, b) for i, b in enumerate(diagram.branches) if not b.mirrored]
     nodes = diagram.events
     for _, branch in branches[:1]:

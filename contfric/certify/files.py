@@ -260,7 +260,8 @@ def verify(path: Any) -> Answer:
         return answer._replace(why=f"{file.name} is no certificate: {other}")
     if not answer.yes and '"checkable": []' in text:  # of another model, or all orbits have holds
         why = (
-            f"it holds nothing that is checked: orbits without holds of {', '.join(CHECKED_MODELS)}"
+            "it has no statement that is checked here. Checked are orbits without holds of the model "
+            f"{', '.join(CHECKED_MODELS)}, their events and branches; of others it has the summary only"
         )
         return answer._replace(why=why)
     return answer

@@ -172,7 +172,7 @@ def range_over(path: Path, derivatives: Derivatives, level: int, index: int) -> 
 
 
 def positive(
-    path: Path, row: arb_mat, start_order: int, ends: bool, bends: bool = False
+    path: Path, row: arb_mat, start_order: int, end_order: int, bends: bool = False
 ) -> Finding:
     """Find whether an observable is positive inside of a segment.
 
@@ -180,10 +180,10 @@ def positive(
     ----------
     row : the observable less its level, times the sign that is wanted
     start_order : how many of q, q', q'' vanish at the start by construction; 0 if q does not
-    ends : whether q vanishes at the end by construction
+    end_order : the same at the end
     bends : whether q falls at the end, too, if only a little: so it does before where q'' is positive
     """
-    shown = _shown(path, row, start_order, ends, bends)
+    shown = _shown(path, row, start_order, end_order, bends)
     level = 0
     while (path.norm * path.duration).upper() > 2**level and 2**level < _MOST:
         level += 1
@@ -194,29 +194,32 @@ def positive(
         level, index = waiting.pop()
         found = shown(level, index)
         if found is False:
-            return Finding(Verdict.REFUTED, f"negative after {_share(level, index)} of it")
+            return Finding(Verdict.REFUTED, f"violated at {_share(level, index)} of its duration")
         if found:
             continue
         if level >= _NARROW:
-            return Finding(Verdict.UNDECIDED, f"no sign after {_share(level, index)} of it")
+            return Finding(
+                Verdict.UNDECIDED, f"not decided at {_share(level, index)} of its duration"
+            )
         waiting += [(level + 1, 2 * index + 1), (level + 1, 2 * index)]
     return Finding(Verdict.UNDECIDED, "the segment needs too many pieces")
 
 
 def _shown(
-    path: Path, row: arb_mat, start_order: int, ends: bool, bends: bool
+    path: Path, row: arb_mat, start_order: int, end_order: int, bends: bool
 ) -> Callable[[int, int], bool | None]:
     """Return what tells whether an observable is positive on a piece; None if that is not decided."""
     rows = path.derivatives(row)
     first = path.derivatives(higher(path, row, start_order)) if start_order else rows
-    last = path.derivatives(-row * path.field) if ends else rows
+    sign = (-1) ** end_order  # of the derivatives by the time that is left
+    last = path.derivatives(higher(path, row, end_order) * sign) if end_order else rows
     bend = path.derivatives(higher(path, row, 2)) if bends else rows
 
     def shown(level: int, index: int) -> bool | None:
         value = range_over(path, rows, level, index)
         if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
             return False
-        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and ends
+        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and end_order > 0
         if value > 0:
             return True
         if at_start and range_over(path, first, level, index) > 0:
@@ -229,12 +232,12 @@ def _shown(
     return shown
 
 
-def undecided(path: Path, row: arb_mat, start_order: int, ends: bool) -> arb | None:
+def undecided(path: Path, row: arb_mat, start_order: int, end_order: int) -> arb | None:
     """Return a ball of times outside of which an observable is positive inside of a segment.
 
     None if it may not be positive next to an end of the segment.
     """
-    shown, waiting, level = _shown(path, row, start_order, ends, False), [0], 0
+    shown, waiting, level = _shown(path, row, start_order, end_order, False), [0], 0
     for level in range(_WINDOW + 1):
         found = [k for k in waiting if not shown(level, k)]
         waiting = [half for k in found for half in (2 * k, 2 * k + 1)]
@@ -256,10 +259,10 @@ def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Fi
     at = path.duration if after is None else after
     state = (path.field * at).exp() * path.start
     back = Path(-path.field, state, at.upper())
-    found = positive(back, row, 2, start_order == 1)
+    found = positive(back, row, 2, start_order)
     if after is None or not found.proved:
         return found
-    return positive(Path(path.field, state, (path.duration - at).upper()), row, 2, True)
+    return positive(Path(path.field, state, (path.duration - at).upper()), row, 2, 1)
 
 
 def higher(path: Path, row: arb_mat, order: int) -> arb_mat:

@@ -66,7 +66,9 @@ def _closed(row: Vector, closing: Closing) -> Vector:
 
 def at_start(segments: Segments, model: BallModel, i: int, rows: list[Vector]) -> list[Vector]:
     """Return the rows that vanish where segment i starts: after its reset, if there is one."""
-    return _behind(rows, model, segments.resets[i]) if segments.resets[i] else rows
+    if not segments.resets[i]:
+        return rows
+    return _behind(rows, model, segments.resets[i], segments.modes[i])
 
 
 def _at_end(
@@ -82,10 +84,14 @@ def _at_end(
     return [exit_row, *(row for row in kept if not in_span(row, [exit_row]))]
 
 
-def _behind(rows: list[Vector], model: BallModel, reset: str) -> list[Vector]:
-    """Return the surfaces on which the image of a reset lies."""
+def _behind(rows: list[Vector], model: BallModel, reset: str, mode: str) -> list[Vector]:
+    """Return the surfaces on which the image of a reset lies, and the one of the reset if it is touched.
+
+    An impact without speed leaves without speed: the rate along the mode after it vanishes, too.
+    """
     matrix = model.resets[reset]
-    return [row for row in model.rows.values() if in_span(numbers(arb_mat([row]) * matrix), rows)]
+    found = [*model.rows.values(), model.rate(reset, mode)]
+    return [row for row in found if in_span(numbers(arb_mat([row]) * matrix), rows)]
 
 
 def _is_zero(row: Vector) -> bool:

@@ -337,18 +337,22 @@ class Branch(Shown):
 
         return extrema_of(self, name)
 
-    def certify(self) -> BranchCertificate:
+    def certify(self, *, time_limit: float | None = None) -> BranchCertificate:
         """Prove the branch: one curve of admissible orbits in a tube of boxes, without events but the listed.
+
+        Parameters
+        ----------
+        time_limit : seconds (a structure may take minutes) after which what is left is listed as such
 
         Raises
         ------
         ParameterError
-            If proofs are not offered for the model.
+            If proofs are not offered for the model, or the limit is no number above 0.
         """
         need_flint()
-        from contfric.certify.branch import certify_branch
+        from contfric.certify.branch import certify_branch, latest
 
-        return certify_branch(self)
+        return certify_branch(self, latest(time_limit))
 
     def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas).

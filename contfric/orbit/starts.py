@@ -27,6 +27,8 @@ _DRAWN = 3
 #: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
 #: nobody may have written, and then further out.
 _DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
+#: Surfaces that an error names: more are no line to read.
+_SURFACES_SHOWN = 8
 
 
 def signs_at(
@@ -61,7 +63,12 @@ def start_of(
         if name is None and (name := entered_domain(start, met, standing=True)):
             signs = met
     if name is None:
-        raise ParameterError(f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}")
+        nearest = sorted(start.heights.items(), key=lambda item: abs(item[1]))[:_SURFACES_SHOWN]
+        heights = ", ".join(f"{k}: {h:+.3g}" for k, h in nearest)
+        raise ParameterError(
+            f"the state {y.tolist()} at t = {t!r} is in no domain of {model.name}. Its distances from the "
+            f"surfaces are {heights}; no mode holds on these sides, or a solution cannot start there"
+        )
     mode = model.domain_by_name[name].own_mode
     rest = model.chatter_by_mode.get(mode) if domain is None else None
     if rest is not None:

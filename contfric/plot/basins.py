@@ -29,6 +29,8 @@ _ORBIT: dict[str, Any] = {
     "markeredgecolor": "black",
     "markersize": 5,
 }
+#: What a legend says of starts without a solution.
+_NONE = {"no_motion": "no solution starts there"}
 
 
 def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
@@ -60,7 +62,7 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     shades, most = ListedColormap(colours or [GREY]), max(1, len(colours)) - 0.5
     draw_cells(ax, found.axes, number, cmap=shades, vmin=-0.5, vmax=most)
     _draw_orbits(ax, found, first, second)
-    names = [f"{s.name}: {s.share:.1%}" for s in found.shares]
+    names = [f"{_NONE.get(s.name, s.name)}: {s.share:.1%}" for s in found.shares]
     shown = zip(_shown(found, colours), names, strict=False)
     handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
     if found.orbits and not found.model.autonomous:

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from contfric.errors import ModelError, ParameterError, did_you_mean, shown
 from contfric.models.definition import Model
-from contfric.models.grammar import PI
+from contfric.models.grammar import FLOATS, PI, Scope
 from contfric.models.quantity_texts import FUNCTIONALS, Parsed, read
 from contfric.quantities.inside import Inside, inside_of
 
@@ -63,6 +65,9 @@ NAMED = {
         "largest speed at which a wall is met; 0 without impacts", "impact velocity"
     ),
 }
+#: Trials of an expression with random values, and the powers of ten between which their sizes lie: so
+#: log(x - 500) and acos(500*x) have values at one trial in ten.
+_DRAWS, _SIZES = 200, (-6.0, 6.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +181,26 @@ def _quantity_of(text: str, model: Model) -> Quantity:
         check(parsed, model, ())
     except ModelError as error:
         raise ParameterError(f"quantity '{text}': {error}") from None
+    if not _has_values(parsed):
+        raise ParameterError(
+            f"quantity '{text}' has no finite value, whatever the values of its parts are: something is "
+            "divided by zero, or is a root or logarithm of a negative number"
+        )
     return Quantity(text, model, parsed)
+
+
+def _has_values(parsed: Parsed) -> bool:
+    """Tell whether an expression is finite for some values of its parts, of many sizes and both signs."""
+    rng, names = np.random.default_rng(0), [*parsed.functionals, *sorted(parsed.names - {PI})]
+    for _ in range(_DRAWS):
+        sizes = rng.normal(size=len(names)) * 10.0 ** rng.uniform(*_SIZES, size=len(names))
+        scope = Scope(FLOATS, dict(zip(names, sizes.tolist(), strict=True)))
+        try:
+            if np.isfinite(scope.evaluate(parsed.tree)):
+                return True
+        except (ArithmeticError, ValueError, TypeError):  # not here
+            continue
+    return False
 
 
 def check(parsed: Parsed, model: Model, above: tuple[str, ...]) -> None:

@@ -152,8 +152,9 @@ def release_of(model: Model, surface: str | None) -> tuple[_WayOutOfRest, str]:
     wanted = [m for m in model.modes if m.sliding]
     if model.autonomous or len(model.states) != 2 or not wanted:
         raise ParameterError(
-            f"releases of '{model.name}' are not told by their phase: that takes two states, rest and a "
-            "period of excitation (cf.poincare(..., section='releases') takes more)"
+            f"model '{model.name}' has no release map: that takes two states, a mode of rest and an "
+            "excitation, so that a release is known by its phase; cf.poincare(..., section='releases') "
+            "takes any model with a mode of rest"
         )
     surfaces = [s.name for s in model.surfaces]
     ways = {

@@ -284,7 +284,7 @@ def test_other_models_have_no_file(tmp_path: Path) -> None:
     path = tmp_path / "b.json"  # of a diagram of such a model
     path.write_text(json.dumps({"certificate": "diagram", "format": 1, "checkable": []}, indent=1))
     assert not verify(path).yes
-    assert "holds nothing that is checked" in verify(path).why
+    assert "no statement that is checked here" in verify(path).why
 
 
 def test_without_flint_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,7 @@ def entries_of(found: Diagram) -> Record:
     return {
         "parameter": found.parameter,
         "complete": found.complete,
+        "multipliers": any(branch.stable is not None for branch in found.branches),
         "branches": [_branch_entry(i, b) for i, b in enumerate(found.branches, start=1)],
         "bifurcations": [
             {
@@ -50,7 +51,7 @@ def lines_of(record: Record) -> Iterator[str]:
     yield ""
     yield from aligned([["branch", "name", "points", name, "", "ends"], *_branch_rows(record)])
     yield ""
-    yield from aligned([["event", name, "branches", ""], *_event_rows(record)])
+    yield from aligned([["event", name, "branches", "scenario"], *_event_rows(record)])
     yield ""
     if record["loose_ends"]:
         yield "unresolved branch ends (loose ends)"
@@ -58,6 +59,8 @@ def lines_of(record: Record) -> Iterator[str]:
     else:
         yield "no loose ends"
     yield from (f"note: {text}" for text in record.get("notes", []))
+    if not record.get("multipliers", True):
+        yield "note: without 'stability' in 'want' PD and NS are not detected, BP only where a branch turns"
     yield from record.get("verification", [])
     if not record["complete"]:
         yield "incomplete: the exploration was stopped before it was done"
@@ -124,5 +127,5 @@ def _event_rows(record: Record) -> Iterator[list[str]]:
     name = record["parameter"]
     names = {branch["branch"]: branch["signature"] for branch in record["branches"]}
     for event in record["bifurcations"]:
-        joined = ", ".join(f"{names[i]} ({i})" for i in event["branches"])
+        joined = "; ".join(f"{names[i]} ({i})" for i in event["branches"])
         yield [event["label"], f"{event['params'][name]:.13g}", joined, event.get("scenario") or ""]
