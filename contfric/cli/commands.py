@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from contfric.cli.exits import Exit
 from contfric.errors import ParameterError, ResultFileError
-from contfric.study.tasks import STEPS
 
 if TYPE_CHECKING:
     from contfric.models import Model, ModelSource
@@ -55,7 +54,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_summary(result: StudyResult) -> None:
-
     print(*headline(result.info), *findings(result.info), "", sep="\n")
     print(f"written to {result.out}: {', '.join(path.name for path in result.files)}")
 
@@ -272,6 +270,8 @@ def headline(record: Record) -> Iterator[str]:
 
 def findings(record: Record) -> Iterator[str]:
     """Yield the start, and what each task has found."""
+    from contfric.study.tasks import STEPS
+
     for task in STEPS:
         yield from task.summary(record)
 
