@@ -7,20 +7,18 @@ import csv
 import json
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from contfric.cli.exits import Exit
 from contfric.errors import ParameterError, ResultFileError
-from contfric.study.tasks import STEPS
 
 if TYPE_CHECKING:
     from contfric.models import Model, ModelSource
     from contfric.study import StudyResult
 
 Command: TypeAlias = Callable[[argparse.Namespace], int]
-Record = dict[str, Any]
 
 
 def say(text: str) -> None:
@@ -55,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_summary(result: StudyResult) -> None:
+    from contfric.cli.summary import findings, headline
 
     print(*headline(result.info), *findings(result.info), "", sep="\n")
     print(f"written to {result.out}: {', '.join(path.name for path in result.files)}")
@@ -80,6 +79,7 @@ def explain(options: argparse.Namespace) -> int:
 
 def info(options: argparse.Namespace) -> int:
     """``contfric info DIR``."""
+    from contfric.cli.summary import findings, headline, work
     from contfric.study.plan import RECORD
     from contfric.study.tasks.diagram_record import proposals
 
@@ -262,31 +262,3 @@ def _number(text: str, what: str) -> float:
         return float(text)
     except ValueError:
         raise ParameterError(f"{what} must be a number, got '{text}'") from None
-
-
-def headline(record: Record) -> Iterator[str]:
-    """Yield the title and the status."""
-    yield f"{record['name']}: {record['title']}"
-    yield f"status    {record['status']}; contfric {record['contfric']}, {record['date']}"
-
-
-def findings(record: Record) -> Iterator[str]:
-    """Yield the start, and what each task has found."""
-    for task in STEPS:
-        yield from task.summary(record)
-
-
-def work(record: Record) -> Iterator[str]:
-    """Yield what was done: counts, times, what was skipped, files."""
-    yield ""
-    counts = ", ".join(
-        f"{value} {name.replace('_', ' ')}" for name, value in record["counts"].items()
-    )
-    times = ", ".join(f"{name} {seconds:.3g} s" for name, seconds in record["timings"].items())
-    yield f"counts    {counts}"
-    yield f"times     {times}"
-    for index, item in enumerate(record["skipped"]):
-        yield f"{'skipped' if index == 0 else '':10}{item['what']}: {item['why']}"
-    for failure in record["failures"]:
-        yield f"failed    {failure}"
-    yield f"files     {', '.join(record['files'])}"

@@ -208,7 +208,6 @@ class Places:
     """
 
     def __init__(self, model: Model, params: dict[str, float], at: Mapping[str, float] | None):
-
         self.model, self.params = model, params
         self.given = {} if at is None else checked_positions(model, at)
         self.stated = {

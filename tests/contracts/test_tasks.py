@@ -71,7 +71,7 @@ class ShareTask(Task):
 def with_share(monkeypatch) -> None:
     """The list of tasks with one more."""
     monkeypatch.setattr("contfric.study.read.SCHEMA", schema_of((*TASKS, ShareTask)))
-    monkeypatch.setattr("contfric.cli.commands.STEPS", (*STEPS, ShareTask))
+    monkeypatch.setattr("contfric.cli.summary.STEPS", (*STEPS, ShareTask))
 
 
 def test_a_new_task_is_one_class(with_share, write, tmp_path, capsys) -> None:

@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 
 import contfric as cf
-from contfric.certify import census
+from contfric.certify import census_search
 from contfric.certify.following import Follower, Returned
 from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.errors import ParameterError
@@ -150,7 +150,7 @@ def test_where_bridges_are_no_orbit_takes_their_place() -> None:
 
 
 def test_what_is_not_decided_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(census, "_MOST", 70)
+    monkeypatch.setattr(census_search, "_MOST", 70)
     found = cf.certify_census("coulomb", PARAMS)
     assert not found.proved
     assert found.strips
