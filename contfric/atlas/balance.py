@@ -36,8 +36,7 @@ if TYPE_CHECKING:
 
 #: Points this near to an event (in accuracies of its place) are on no side of it.
 _BESIDE = 10.0
-#: Arclength from an event, in sizes of the orbit, within which multipliers next to 1 may be rounding: a few
-#: times the cube root of it, up to which a point next to the vertex of a pitchfork is blurred.
+#: Arclength from an event, in sizes of the orbit, below which a multiplier may be 1 but for rounding.
 _BLURRED = 1e-4
 #: Values of the parameter between two neighbouring events at which indices are summed.
 _SHARES = (0.381966, 0.618034)
@@ -194,12 +193,13 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
         run = simulate(model, params, state=state, time=float(time), periods=_TRIED, events=_EVENTS)
     except ContfricError:  # no such state there, or a value outside of the limits
         return False
-    if not all(model.mode_by_name[mode].sliding for mode, _ in run.itinerary):
-        return False
-    if all(model.is_at_rest(mode) for mode, _ in run.itinerary):
-        return True
     visited = np.array([*run.states, run.last[2]])  # where one mass rests others may move
-    return bool(np.abs(visited - state).max() < _STILL)
+    still = bool(np.abs(visited - state).max() < _STILL)
+    modes = [mode for mode, _ in run.itinerary]
+    if still and run.last[3] and model.is_at_rest(run.last[3]):
+        return True  # whatever it was in for no time, as at a wall that just touches it
+    sliding = all(model.mode_by_name[mode].sliding for mode in modes)
+    return sliding and (still or all(model.is_at_rest(mode) for mode in modes))
 
 
 def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:

@@ -38,6 +38,7 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.samples import state_within
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
@@ -253,6 +254,10 @@ def margin_sizes(orbit: Orbit) -> list[float]:
 
     Heights have units, so that a height in metres may be a millionth of that in micrometres.
     """
+    places = list(orbit.ends)
+    for i, lasts in enumerate(orbit.durations.tolist()):  # a velocity is zero at all joints
+        later = _SHARES[0] * lasts
+        places.append(np.append(orbit.begins[i, 0] + later, state_within(orbit, i, later)))
     heights: dict[str, float] = {}
     sizes = []
     for test in orbit.system.tests:
@@ -260,7 +265,7 @@ def margin_sizes(orbit: Orbit) -> list[float]:
             sizes.append(1.0)
             continue
         if test.surface not in heights:
-            values = [orbit.flow.height(test.surface, float(e[0]), e[1:]) for e in orbit.ends]
+            values = [orbit.flow.height(test.surface, float(e[0]), e[1:]) for e in places]
             heights[test.surface] = max(map(abs, values), default=0.0) or 1.0
         sizes.append(heights[test.surface])
     return sizes

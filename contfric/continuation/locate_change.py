@@ -61,7 +61,8 @@ def locate_label(
     """Locate a change of a label: the first one, seen from the one point, and the last one if it is another.
 
     Where every trial had one of the two labels the last change, seen from the other point, is the first:
-    the same locations are tried.
+    the same locations are tried. A change at the first point itself, such as an event at which a branch
+    starts, is found without a trial, which says nothing of those after it.
     """
     from contfric.continuation.bracket import BY_LABEL
 
@@ -70,7 +71,7 @@ def locate_label(
         target = float(one.labels[index])
         point, plain = _located(orbit, one, other, settings, BY_LABEL, index, target)
         found += [] if point is None else [point]
-        if found and plain:
+        if point is not None and plain and point.arc != one.arc:
             break
     return found
 

@@ -34,3 +34,18 @@ def test_a_branch_goes_on_where_an_element_sticks_all_along(seed: int) -> None:
     assert sorted(len(b.system.itinerary) for b in diagram.branches) == [1, 2]
     held = diagram.verify(2)
     assert held.passed, str(held)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_wall_that_no_longer_reaches_a_mass_leaves_it_at_rest(seed: int) -> None:
+    """It pushes the mass to where it comes itself, and friction holds it there if the spring is soft."""
+    rng = np.random.default_rng([617, seed])
+    near = {"b": 0.7111, "m": 1.0688, "Ff": 0.8772, "omega": 0.901, "a": 0.8548, "e": 0.8864}
+    params = {name: float(v * rng.uniform(0.95, 1.05)) for name, v in near.items()}
+    expected = params["Ff"] / (params["a"] - params["b"])
+    orbit = cf.find_orbit("impact-friction", params | {"k": 1.03 * expected})
+    diagram = cf.explore(orbit, "k", (0.95 * expected, 1.06 * expected), max_periods=2)
+    (event,) = diagram.of_kind("AS")
+    assert event.params["k"] == pytest.approx(expected, rel=1e-9)
+    balances = diagram.verify(1).balances
+    assert [(b.below, b.above) for b in balances] == [(1, 1)] * len(balances) != []

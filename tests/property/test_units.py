@@ -91,6 +91,29 @@ def test_a_block_in_si_units_has_the_diagram_of_the_paper(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
+    "seed",
+    [12, 15, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2, 3, 4, 9, 16, 17, 23))],
+)
+def test_a_block_without_units_has_the_same_events(seed: int) -> None:
+    """Lengths, masses and times of other sizes: what is small is so against the orbit's own numbers."""
+    rng = np.random.default_rng([92, seed])
+    natural, length, m = (float(10.0 ** rng.uniform(-w, w)) for w in (2, 3, 3))
+    k, force = m * natural**2, m * natural**2 * length
+    sizes = (2.0 * length, length * natural)
+    values = (m, k, force, 0.5 * natural, 0.32 * force, 0.4 * force, *sizes)
+    model = model_of(yaml.safe_load(FRICTION % values), Path())
+    found = cf.explore(cf.find_orbit(model), "w", (0.4 * natural, 0.6 * natural))
+    start = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    wanted = cf.explore(start, "Omega", (0.4, 0.6))
+    assert not found.loose_ends and len(found.branches) == len(wanted.branches)
+    assert all(balance.holds for balance in found.verify(0).balances)
+    for one, other in zip(found.events, wanted.events, strict=True):
+        a, b = one.bifurcation, other.bifurcation
+        assert a.label == b.label
+        assert a.params["w"] / natural == pytest.approx(b.params["Omega"], abs=1e-8)
+
+
+@pytest.mark.parametrize(
     "name", [*MODELS, *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS)]
 )
 def test_units_change_numbers_only(name: str) -> None:
