@@ -200,7 +200,7 @@ def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # t
 
 @helper
 def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall lets go.
+    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall is left.
 
     Otherwise after how many impacts, counted from this one, that is to be asked again.
     ``workspace.after`` is written over.
@@ -211,7 +211,13 @@ def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
     on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
     _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    return 0 if met >= 0 and tables.bounds[chatter, met] == 1 else count
+    if met < 0 or tables.bounds[chatter, met] == 0:
+        return count
+    rules = chatter * tables.observables.shape[0] + met
+    thrown = (
+        tables.first[rules + 1] > tables.first[rules]
+    )  # carried against another wall, it is thrown off
+    return 0 if tables.bounds[chatter, met] == 1 or thrown else count
 
 
 @helper
