@@ -19,7 +19,7 @@ from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.models.parts import MOST_SURFACES
 from contfric.orbit.ahead import begun_on
-from contfric.orbit.resting import impacts_ahead, still_bounced
+from contfric.orbit.resting import impacts_ahead, is_left, still_bounced
 from contfric.orbit.sides import flight_of, leads_to, mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
@@ -211,13 +211,7 @@ def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
     on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
     _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    if met < 0 or tables.bounds[chatter, met] == 0:
-        return count
-    rules = chatter * tables.observables.shape[0] + met
-    thrown = (
-        tables.first[rules + 1] > tables.first[rules]
-    )  # carried against another wall, it is thrown off
-    return 0 if tables.bounds[chatter, met] == 1 or thrown else count
+    return 0 if is_left(tables, chatter, met) else count
 
 
 @helper

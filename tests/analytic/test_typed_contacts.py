@@ -95,7 +95,7 @@ def test_a_valve_that_rests_on_its_cam_meets_its_seat(tmp_path: Path, seed: int)
     assert orbit.converged and orbit.admissible
     met = orbit.ends[[i for i, s in enumerate(orbit.itinerary) if s == ("chatter_cam", "seat")]]
     valve = Valve(W, e, es, 0.2)
-    later = np.vstack([met[1:], met[:1] + [orbit.period, 0.0, 0.0]])
+    later = np.vstack([met[1:], met[:1] + np.array([orbit.period, 0.0, 0.0])])
     for (t, x, v), (again, _, speed) in zip(met, later, strict=True):  # impact by impact
         assert x == pytest.approx(0.0, abs=1e-12)
         assert valve.turn(t, 0.0, -es * v) == pytest.approx((again, speed), abs=1e-9)
