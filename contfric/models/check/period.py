@@ -45,7 +45,7 @@ def undeclared_angles(probe: Probe) -> dict[str, str]:
     model = probe.model
     if not model.definition:
         return {}
-    known = {name for reset in model.resets for name in reset.changes}
+    known = _mapped(probe)
     walls = [model.surface_by_name[reset.surface].observable for reset in model.resets]
     places = [
         (mode.name, *place) for mode in model.modes for place in probe.places(mode.name, *_DRAWN)
@@ -72,6 +72,19 @@ def undeclared_angles(probe: Probe) -> dict[str, str]:
             continue
         found[state] = _AS_WALL if (False, False) in kinds else _AS_ANGLE
     return {state: text.format(state) for state, text in found.items()}
+
+
+def _mapped(probe: Probe) -> set[str]:
+    """Return the states that resets map, at a few places on their surfaces."""
+    return {
+        state
+        for reset in probe.model.resets
+        for t, y in probe.on(reset.surface, _DRAWN[1])
+        for state, old, new in zip(
+            probe.model.states, y, probe.reset(reset.surface, t, y), strict=True
+        )
+        if not _same(old, new)
+    }
 
 
 def _same(now: ArrayLike, then: ArrayLike) -> bool:
