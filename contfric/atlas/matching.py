@@ -14,9 +14,9 @@ from contfric.continuation.continuum import is_continuum
 from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.itineraries import mirror_pairs, whole_of
-from contfric.orbit.orbit import Orbit
+from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.slides import modulo
-from contfric.orbit.solve import refine
+from contfric.orbit.solve import ended_at_surfaces, refine
 from contfric.orbit.system import Itinerary
 from contfric.signature import ReducedItinerary, canonical_itinerary
 
@@ -162,6 +162,8 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
         return _in_family(orbit, branch, mirror)
     for _, guess in guesses(branch, orbit.vector, value):
         solved = refine(guess, damped=False)
+        if solved.status is Status.NOT_FINITE:  # a neuron that blows up just behind its threshold
+            solved = refine(ended_at_surfaces(guess), damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.abs(orbit.stops).max(initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same
         if alike and orbit.outline.apart(solved.outline) < SAME_SOLUTION:

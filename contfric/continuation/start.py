@@ -9,6 +9,7 @@ from contfric.continuation.points import EXTRA, Point, Settings, next_to
 from contfric.continuation.side import first_point
 from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError
+from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
 from contfric.orbit.solve import refine
@@ -35,7 +36,7 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
         If the orbit has no unique continuation.
     """
     orbit = _as_symmetric(canonical(orbit).as_half())
-    start = first_point(orbit, settings)
+    start = first_point(orbit, settings) or _along_null(orbit, settings)
     at_event = start is not None and _is_at_event(start, settings)
     if start is None or (
         at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
@@ -43,6 +44,13 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
         why = _why(orbit, settings)
         raise ConvergenceError(f"the orbit has no unique continuation: {why}", orbit)
     return _off_events(orbit, start, settings)
+
+
+def _along_null(orbit: Orbit, settings: Settings) -> Point | None:
+    """Return the point where the parameter tells no orbits apart: at a fold, in a continuum at one value."""
+    active = orbit.model.index_of(settings.parameter)
+    vectors, slopes = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    return first_point(orbit, settings, vectors[0], slopes[0]) if len(vectors) == 1 else None
 
 
 def _as_symmetric(orbit: Orbit) -> Orbit:

@@ -139,7 +139,7 @@ class Landing:
             raise EntryError(
                 ("angles",),
                 f"a turn ends at '{self.surface}', and no mode holds after it, so that nothing turns round: "
-                "leave 'angles' out, or write the surface that is in the way as sin((theta - wall)/2) = 0",
+                "leave 'angles' out, and write a wall that is met in each turn as sin((theta - wall)/2) = 0",
             )
         raise EntryError(
             ("resets", self.surface),

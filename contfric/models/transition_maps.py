@@ -11,13 +11,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
+from contfric.models.chatter_maps import ChatterMaps
 from contfric.models.overlapping import nearest, turned_back
 from contfric.models.parts import across, led
-from contfric.models.section_maps import SectionMaps
 
 if TYPE_CHECKING:
     from contfric.models.parts import (
-        Chatter,
         Departure,
         Domain,
         FloatArray,
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
     )
 
 
-class TransitionMaps(SectionMaps):
+class TransitionMaps(ChatterMaps):
     """The part of a model that derives its transitions from its domains, departures and resets."""
 
     if TYPE_CHECKING:
@@ -38,7 +37,6 @@ class TransitionMaps(SectionMaps):
         kinks: tuple[str, ...]
         turned: frozenset[tuple[str, str]]
         turned_at_times: frozenset[tuple[str, str]]
-        chatters: tuple[Chatter, ...]
 
     @property
     def composed(self) -> bool:
@@ -60,17 +58,6 @@ class TransitionMaps(SectionMaps):
     @cached_property
     def _domain_places(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.domain_by_name)}
-
-    def domains_of(self, mode: str) -> tuple[Domain, ...]:
-        """Return the domains of a mode."""
-        return self._domains_by_mode.get(self.whole_mode(mode), ())
-
-    @cached_property
-    def _domains_by_mode(self) -> dict[str, tuple[Domain, ...]]:
-        found: dict[str, list[Domain]] = {}
-        for domain in self.domains:
-            found.setdefault(domain.mode, []).append(domain)
-        return {mode: tuple(own) for mode, own in found.items()}
 
     def exits_of(self, domain: str) -> Iterable[tuple[str, str]]:
         """Return (surface, domain that follows), for all ways out of a domain but resets."""
@@ -202,15 +189,6 @@ class TransitionMaps(SectionMaps):
         passes = (domain.name, surface) in self.transitions
         return bounded and not passes and not self.maps_at(domain, surface)
 
-    @cached_property
-    def _side_of(self) -> dict[tuple[str, str], int]:
-        """The side of each surface that a declared mode lies on; 0 if on both, or on it."""
-        sides: dict[tuple[str, str], set[int]] = {}
-        for domain in self.domains:
-            for surface, sign in domain.signs.items():
-                sides.setdefault((domain.own_mode, surface), set()).add(sign)
-        return {key: signs.pop() if len(signs) == 1 else 0 for key, signs in sides.items()}
-
     def changed_by(self, reset: Reset, surface: str) -> bool:
         """Return whether a reset may change the sign at a surface."""
         return self.surface_by_name[surface].observable in reset.changes
@@ -230,13 +208,14 @@ class TransitionMaps(SectionMaps):
             asked[reset.surface] *= domain.signs[reset.surface]
         behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
+        for sides in self.thrown_off(asked, domain.own_mode):
+            behind += self._domains_landed(reset).get(tuple(sides[n] for n in sorted(sides)), [])
         behind = [d for d in behind if not reset.ways or d.name in reset.ways]
         behind = led(behind, reset.leads, domain.own_mode)
         if reset.stays and not reset.changes:  # it only says the mode
             labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
             behind += across(behind, reset.surface, labels, self.domains)
-        chatter = self.chatter_at.get((domain.mode, reset.surface))
-        resting = self.domains_of(chatter.mode) if chatter else ()
+        resting = self.rest_after(domain, reset.surface)
         return tuple(dict.fromkeys(d.name for d in (*behind, *resting)))
 
     def _departed(self, asked: Mapping[str, int]) -> list[Domain]:
@@ -268,25 +247,6 @@ class TransitionMaps(SectionMaps):
             and d.own_mode in named
             and all(d.signs[s] == side or (s in slid and d.signs[s]) for s, side in asked.items())
         ]
-
-    @cached_property
-    def chatter_at(self) -> dict[tuple[str, str], Chatter]:
-        """Chatter that impacts in a mode, at a surface, may lead to."""
-        return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
-
-    @cached_property
-    def settled_sides(self) -> dict[str, int]:
-        """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
-        return {
-            lift: self.domains_of(own.mode)[0].signs[lift]
-            for own in self.chatters
-            for lift, _ in own.ways
-        }
-
-    @cached_property
-    def chatter_by_mode(self) -> dict[str, Chatter]:
-        """Chatter by its modes."""
-        return {own.mode: own for own in self.chatters}
 
     def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""

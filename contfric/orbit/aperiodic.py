@@ -14,6 +14,8 @@ import math
 import numpy as np
 
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError
+from contfric.models.check.period import undeclared_angles
+from contfric.models.check.probe import Probe
 from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
@@ -28,6 +30,8 @@ MOST, _LEAST = 50_000, 1_000
 _WORK = 2e6
 #: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
 _GROWTH = 2.0
+#: Turns within the last half of a simulation, of a solution that goes round for good.
+_TURNS = 8
 #: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
 #: part by a larger factor than quasi-periodic ones, in proportion to time, could.
 _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
@@ -56,6 +60,24 @@ def why_none(
         return ConvergenceError(_unbounded(trajectory), trajectory)
     text = _advice(trajectory, done) + (_parting(trajectory) if compared else "")
     return AperiodicError(text, trajectory)
+
+
+def goes_round(trajectory: Trajectory, done: int) -> str:
+    """Return which state goes round and round and is not declared as an angle; nothing if none does."""
+    model, half = trajectory.model, len(trajectory) // 2
+    if done < _LEAST or not half:
+        return ""
+    turns = np.abs(trajectory.states[-1] - trajectory.states[half]) / (2.0 * np.pi)
+    if not np.any(turns > _TURNS):
+        return ""
+    for state, text in undeclared_angles(Probe(model, trajectory.params)).items():
+        k = model.states.index(state)
+        if turns[k] > _TURNS:
+            return (
+                f"no periodic orbit: '{state}' goes round and round (to {trajectory.states[-1, k]:.3g} so "
+                f"far), and is no angle of the model. If it is one, {text}"
+            )
+    return ""
 
 
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:

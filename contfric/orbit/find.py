@@ -16,6 +16,7 @@ from contfric.orbit.aperiodic import (
     MOST_PERIODS,
     affordable,
     goes_on,
+    goes_round,
     out_of_range,
     why_none,
 )
@@ -182,6 +183,8 @@ def _settled(
         if done >= most:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             raise why_none(trajectory, done, slow, compared=longest is None)
+        if why := goes_round(trajectory, done):
+            raise ConvergenceError(why, trajectory)
         behind = _after_creep(trajectory)
         if behind is not None:
             time, state = behind
@@ -244,6 +247,13 @@ def _check_motion(trajectory: Trajectory) -> None:
         if trajectory.end is SimulationEnd.HELD and mode:
             why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
+        if missing and (rest := trajectory.model.chatter_by_mode.get(mode)):
+            raise ConvergenceError(
+                f"no periodic orbit: the solution rests on '{rest.surface}' where a reset acts that does not "
+                "throw it off, which is not offered. Start elsewhere (state=...), or write what a clock "
+                "drives as a function of t",
+                trajectory,
+            )
         if missing and len(walls := _walls_met(trajectory)) > 1:
             raise ConvergenceError(
                 f"no periodic orbit: {' and '.join(map(repr, walls))} are hit at the same time, which is not "

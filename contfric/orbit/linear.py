@@ -143,10 +143,12 @@ def null_space(
 
 
 def null_rows(matrix: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of the null space of a matrix, rows.
+    """Return an orthonormal basis of the null space of a matrix, rows; none if it is not finite.
 
     Equations are scaled to one size before: rates of a stiff structure would make all others look like zeros.
     """
+    if not np.all(np.isfinite(matrix)):
+        return np.empty((0, matrix.shape[1]))
     size = np.linalg.norm(matrix, axis=1, keepdims=True)
     _, singular, right = np.linalg.svd(matrix / np.where(size > _NULL, size, 1.0))
     found: FloatArray = right[int(np.sum(singular > _NULL * singular[0])) :]

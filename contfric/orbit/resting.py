@@ -73,6 +73,16 @@ def meets_another(functions, tables, mode, surface, t, y, tau, p, workspace):  #
 
 
 @helper
+def is_left(tables, chatter, met):  # type: ignore[no-untyped-def]
+    """Tell whether contact ends at a surface (-1: none): the wall lets go, or another one throws it off."""
+    if met < 0:
+        return False
+    rules = chatter * tables.observables.shape[0] + met
+    thrown = tables.bounds[chatter, met] == MAPPED and tables.first[rules + 1] > tables.first[rules]
+    return tables.bounds[chatter, met] == 1 or thrown
+
+
+@helper
 def still_bounced(tables, mode, target, bounced):  # type: ignore[no-untyped-def]
     """Return 1 + the wall that was met last where impacts at it go on alike after another event, else 0.
 

@@ -66,6 +66,27 @@ def refine(orbit: Orbit, damped: bool = True) -> Orbit:
     return Orbit(orbit.system, joints, vector, float(residual), _STATUSES[int(status)])
 
 
+def ended_at_surfaces(orbit: Orbit) -> Orbit:
+    """Return a guess whose segments that are not finite end where they first meet their surfaces.
+
+    Where a solution is infinite soon after its surface, times must be guessed far better than states.
+    Without excitation, and on a whole cycle: there the times of all segments are free.
+    """
+    if not orbit.model.autonomous or orbit.system.half or orbit.system.holds:
+        return orbit
+    durations, flow = orbit.durations.copy(), orbit.flow
+    for k, ((mode, surface), (t, *y)) in enumerate(zip(orbit.itinerary, orbit.begins, strict=True)):
+        start, within = np.array(y), float(durations[k])
+        if not np.all(np.isfinite(flow.state(mode, t, start, within))):
+            observable = orbit.model.surface_by_name[surface].observable
+            on = abs(flow.height(surface, t, start)) < _SAME
+            met = flow.first(mode, observable, flow.level(surface), t, start, within, on=on)
+            durations[k] = within if met is None else met[0]
+    joints = orbit.joints.copy()
+    joints[:, 0] = -np.cumsum(durations[::-1])[::-1]
+    return replace(orbit, joints=joints)
+
+
 def solve_orbit(
     model: ModelSource,
     signature: str | Path | Signature,

@@ -19,7 +19,7 @@ from contfric.flow.layouts import FlowType
 from contfric.models.definition import FloatArray
 from contfric.models.parts import MOST_SURFACES
 from contfric.orbit.ahead import begun_on
-from contfric.orbit.resting import impacts_ahead, still_bounced
+from contfric.orbit.resting import impacts_ahead, is_left, still_bounced
 from contfric.orbit.sides import flight_of, leads_to, mode_after, sign_code, surfaces_after
 from contfric.orbit.simulation import EventRows
 from contfric.orbit.system import IntArray
@@ -200,7 +200,7 @@ def code_ahead(functions, tables, mode, surface, t, y, p, unit, workspace):  # t
 
 @helper
 def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace):  # type: ignore[no-untyped-def]
-    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall lets go.
+    """Return 0 if infinitely many impacts follow, with nothing else between, until the wall is left.
 
     Otherwise after how many impacts, counted from this one, that is to be asked again.
     ``workspace.after`` is written over.
@@ -211,7 +211,7 @@ def leads_to_rest(functions, tables, chatter, surface, t, y, p, unit, workspace)
     on = tables.landed[chatter, surface]
     longest = SLIDE_PERIODS * unit
     _, met = first_hit(functions, tables, chatter, on, t, y, p, longest, unit, workspace)
-    return 0 if met >= 0 and tables.bounds[chatter, met] == 1 else count
+    return 0 if is_left(tables, chatter, met) else count
 
 
 @helper

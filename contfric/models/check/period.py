@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contfric.models.check.probe import Probe
 from contfric.models.definition import FloatArray
@@ -17,6 +18,11 @@ from contfric.models.definition import FloatArray
 _SAME = 1e-8
 #: A time after which anything that depends on it is another, without excitation.
 _LATER = 0.7310585
+#: States that are drawn for each mode, and at most asked: what is so at four random ones is so everywhere.
+_DRAWN = (40, 4)
+#: What to write for an angle, and for one with a wall: no solution turns past that.
+_AS_ANGLE = "write 'angles: [{0}]': only then solutions that go round are periodic"
+_AS_WALL = "write its walls as sin(({0} - wall)/2) = 0: only then they are met in each turn"
 
 
 def changed_after_a_period(probe: Probe, modes: Sequence[str], t: float, y: FloatArray) -> str:
@@ -31,7 +37,57 @@ def changed_after_a_period(probe: Probe, modes: Sequence[str], t: float, y: Floa
     return ""
 
 
-def _same(now: FloatArray | float, then: FloatArray | float) -> bool:
+def undeclared_angles(probe: Probe) -> dict[str, str]:
+    """Return what to write for each state that may be an angle: a turn (2 pi) of it changes no field.
+
+    A state that resets map begins again by these; and a wall that is met in each turn is between its turns.
+    """
+    model = probe.model
+    if not model.definition:
+        return {}
+    known = _mapped(probe)
+    walls = [model.surface_by_name[reset.surface].observable for reset in model.resets]
+    places = [
+        (mode.name, *place) for mode in model.modes for place in probe.places(mode.name, *_DRAWN)
+    ]
+    found = {}
+    for state in (s for s in model.states if s not in known):
+        step = np.array([float(s == state) for s in model.states])
+        here, turned, beside = (
+            [probe.field(mode, t, y + turn * step) for mode, t, y in places]
+            for turn in (0.0, 2.0 * np.pi, 1.0)
+        )
+        if not all(map(_same, here, turned)) or all(map(_same, here, beside)):
+            continue
+        met = [
+            [abs(probe.flow.observe(wall, t, y + turn * step)) for _, t, y in places]
+            for wall in walls
+            for turn in (0.0, 2.0 * np.pi, 1.0)
+        ]
+        kinds = [
+            (_same(now, then), _same(now, aside))
+            for now, then, aside in zip(met[::3], met[1::3], met[2::3], strict=True)
+        ]
+        if (True, False) in kinds:
+            continue
+        found[state] = _AS_WALL if (False, False) in kinds else _AS_ANGLE
+    return {state: text.format(state) for state, text in found.items()}
+
+
+def _mapped(probe: Probe) -> set[str]:
+    """Return the states that resets map, at a few places on their surfaces."""
+    return {
+        state
+        for reset in probe.model.resets
+        for t, y in probe.on(reset.surface, _DRAWN[1])
+        for state, old, new in zip(
+            probe.model.states, y, probe.reset(reset.surface, t, y), strict=True
+        )
+        if not _same(old, new)
+    }
+
+
+def _same(now: ArrayLike, then: ArrayLike) -> bool:
     """Tell whether values agree to rounding; those that are not finite say nothing."""
     with np.errstate(invalid="ignore"):
         return not np.any(np.abs(np.subtract(then, now)) > _SAME * (1.0 + np.abs(now)))

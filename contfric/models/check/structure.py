@@ -7,7 +7,7 @@ from collections.abc import Iterator, Set
 import numpy as np
 
 from contfric.models.check.passages import check_left, crossed_limits, other_side
-from contfric.models.check.period import changed_after_a_period, not_periodic
+from contfric.models.check.period import changed_after_a_period, not_periodic, undeclared_angles
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
@@ -337,8 +337,13 @@ def check_period(report: ModelReport, probe: Probe) -> None:
 
 
 def check_angles(report: ModelReport, probe: Probe) -> None:
-    """Check that fields and observables are the same a turn of an angle later."""
+    """Check that fields are the same a turn of an angle later, and look for angles that are not declared."""
     model = probe.model
+    for state, text in undeclared_angles(probe).items():
+        report.note(
+            Topic.UNDECLARED,
+            f"the fields are the same a turn (2 pi) of '{state}' later: if it is an angle, {text}",
+        )
     for state in {
         s for reset in model.resets if reset.wraps for s in model.states if s in reset.changes
     }:
