@@ -462,5 +462,5 @@ def test_a_diagram_without_multipliers_says_what_it_may_miss(study, tmp_path, ca
     path = study(HEAD + "explore: {parameter: Omega, range: [0.49, 0.51]}\n" + want)
     assert main(["run", path, "--out", str(tmp_path / "out")]) == Exit.DONE
     out = capsys.readouterr().out
-    assert ("PD and NS are not detected" in out) == ("extrema" in want)
+    assert ("PD and NS are not detected" in out) == ("stability" not in want)
     assert "branches" in out and "scenario" in out
