@@ -204,9 +204,8 @@ class Branch(Shown):
         """
         if self.bridge:
             return np.zeros(len(self), dtype=bool)
-        if self.turn_multipliers is None:
-            return None
-        return np.asarray(np.all(np.abs(self.turn_multipliers) < 1.0, axis=1))
+        mu = self.turn_multipliers
+        return None if mu is None else np.asarray(np.all(np.abs(mu) < 1.0, axis=1))
 
     @cached_property
     def margins(self) -> FloatArray:
@@ -283,8 +282,7 @@ class Branch(Shown):
         )
 
     def _all_bifurcations(self) -> list[Bifurcation]:
-        at_ends = (end.bifurcation for end in self.ends)
-        return [*self.bifurcations, *(b for b in at_ends if b is not None)]
+        return [*self.bifurcations, *(b for end in self.ends if (b := end.bifurcation) is not None)]
 
     def quantity(self, name: QuantityLike) -> FloatArray:
         """Return a quantity at every point, shape (k,); nan-padded (k, stops) for ``"stops"``.

@@ -120,6 +120,8 @@ def one_line(capsys) -> str:
     ("text", "message"),
     [
         ("modell: coulomb\n", ":1: unknown key 'modell'; did you mean 'model'"),
+        (HEAD + "range: [0.4, 0.6]\n", ":3: unknown key 'range' here: it belongs into explore, "),
+        (HEAD + "seeds: {values: 3}\n", ":3: unknown key 'seeds' here: it belongs into explore"),
         ("model: colomb\n", ":1: unknown model 'colomb'; did you mean 'coulomb'"),
         ("model: coulomb\nparams: {S: 0.5}\n", ":2: model 'coulomb' needs S0 >= S"),
         ("model: coulomb\nparams: {Omega: 0}\n", ":2: model 'coulomb' needs Omega > 0"),
@@ -452,3 +454,13 @@ def test_an_abbreviated_force_is_refused(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "--forc" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("want", ["", "want: [stability]\n", "want: [extrema]\n"])
+def test_a_diagram_without_multipliers_says_what_it_may_miss(study, tmp_path, capsys, want) -> None:
+    """The guide said so, and the terminal that there were no loose ends."""
+    path = study(HEAD + "explore: {parameter: Omega, range: [0.49, 0.51]}\n" + want)
+    assert main(["run", path, "--out", str(tmp_path / "out")]) == Exit.DONE
+    out = capsys.readouterr().out
+    assert ("PD and NS are not detected" in out) == ("stability" not in want)
+    assert "branches" in out and "scenario" in out

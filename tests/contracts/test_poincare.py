@@ -109,7 +109,7 @@ def test_bad_release_map(options: dict[str, Any], message: str) -> None:
 
 
 def test_models_without_a_release_map() -> None:
-    with pytest.raises(cf.ParameterError, match="not told by their phase"):
+    with pytest.raises(cf.ParameterError, match="has no release map"):
         cf.release_map("belt")
 
 

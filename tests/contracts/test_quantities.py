@@ -16,7 +16,7 @@ import pytest
 import contfric as cf
 from contfric.errors import ConvergenceError, ModelError, ParameterError
 from contfric.models.quantity_texts import BUNDLED, LIST
-from contfric.quantities.registry import NAMED
+from contfric.quantities.registry import NAMED, quantity_of
 
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
@@ -413,3 +413,23 @@ def test_a_curve_of_extrema_that_cannot_be_says_why(
     with pytest.raises(cf.ContfricError) as caught:
         cf.continue_extremum(**{**asked, **change})
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1/(x_max-x_max)", "x_max/0", "log(-x_max**2)", "sqrt(-1-rms(v)**2)", "1/(rms(v)-rms(v))"],
+)
+def test_what_is_never_finite_is_refused(text: str) -> None:
+    """It was infinite or nan at every point, without a word."""
+    with pytest.raises(
+        cf.ParameterError, match="has no finite value, whatever the values of its parts"
+    ):
+        quantity_of(text, cf.load_model("coulomb"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1/(x_max-x_min)", "log(x_max-500)", "acos(500*x_max)", "sqrt(x_min)", "x_max/sticking", "2"],
+)
+def test_what_is_finite_somewhere_is_not(text: str) -> None:
+    assert quantity_of(text, cf.load_model("coulomb")).name == text

@@ -106,3 +106,19 @@ def test_an_angle_may_be_given_in_any_turn(turn: int, tmp_path: Path) -> None:
         for k in (0, turn)
     ]
     np.testing.assert_allclose(swept[0]["phi"], swept[1]["phi"], atol=1e-9)
+
+
+@pytest.mark.parametrize("state", [[0.5, 1.0], [0.3, 1.0], [9.0, -2.0]])
+def test_a_state_that_is_in_no_domain_is_told_its_distances(tmp_path, state) -> None:
+    path = tmp_path / "hopper.yaml"
+    path.write_text(
+        "name: hopper\nstates: [x, v]\nparameters: {w: 1.5, d: 0.3}\nperiod: 2*pi/w\n"
+        "surfaces: {wall: {observable: x, level: d}}\n"
+        "modes: {free: {in: {wall: -}, field: {x: v, v: -x - 0.1*v + cos(w*t)}}}\n"
+        "resets: {wall: {v: -0.8*v}}\n"
+    )
+    off = f"{state[0] - 0.3:+.3g}".replace("+", r"\+")
+    with pytest.raises(
+        cf.ParameterError, match=rf"in no domain of hopper\. .*wall: {off}[,;] .*no mode"
+    ):
+        cf.simulate(path, state=state)

@@ -1,4 +1,4 @@
-"""The derivative of a turn in balls: its multipliers agree with the engine; pairs on the circle are told."""
+"""The derivative of a turn in balls has the multipliers of the engine; pairs on the circle are told."""
 
 from __future__ import annotations
 

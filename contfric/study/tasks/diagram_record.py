@@ -20,7 +20,7 @@ def entries_of(found: Diagram) -> Record:
     return {
         "parameter": found.parameter,
         "complete": found.complete,
-        "multipliers": any(branch.stable is not None for branch in found.branches),
+        "multipliers": all(branch.stable is not None for branch in found.branches),
         "branches": [_branch_entry(i, b) for i, b in enumerate(found.branches, start=1)],
         "bifurcations": [
             {
