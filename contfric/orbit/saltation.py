@@ -17,8 +17,6 @@ Without excitation the last joint fixes the phase, and what is passed is a plane
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from enum import Enum
 from functools import cache
 from itertools import islice
 
@@ -26,32 +24,16 @@ import numpy as np
 
 from contfric.models.definition import FloatArray, Model
 from contfric.models.view import FlowView
+from contfric.orbit.passages import Passage, fields_between, passage_at
 from contfric.orbit.system import Itinerary, System, following_modes
 from contfric.signature.holds import is_hold
 
-#: Fields that differ by less than this share of each rate's size, at all states, are equal there: rounding.
-_SAME = 1e-9
-#: States at which fields are compared, and at how many sets of parameters. Whether changes are none, of one
-#: direction or of more, two random states tell; the others are there as not all land on the surface.
-_STATES, _SETS = 6, 2
 #: States at which the direction is asked for where it is known to be one: it is taken where the change is
 #: largest, and vanishes at all of these by no accident.
 _FEW = 4
-#: What the second set is changed by: what vanishes at the defaults alone is an accident.
-_MOVED = 1.07
-#: Distance from a surface that counts as on it.
-_ON = 1e-11
 #: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
 #: lose as many digits, twice: twelve are left.
 _SMALL = 1e-2
-
-
-class Passage(Enum):
-    """What the field does at a joint."""
-
-    CONTINUOUS = "the same field on both sides"
-    PROJECTED = "sliding begins, and the field changes along one direction"
-    JUMP = "another field"
 
 
 def pass_when_due(
@@ -118,63 +100,7 @@ def _is_small(slope: FloatArray, field: FloatArray) -> bool:
 
 def _projection(view: FlowView, slope: FloatArray, joint: tuple[str, str, str]) -> FloatArray:
     """Return the map of disturbances where sliding begins; e is that of the state at which it is largest."""
-    pairs = islice(_fields(view, *joint), _FEW)
-    changes = [there - here for here, there in pairs]
+    found = islice(fields_between(view, *joint), _FEW)
+    changes = [there - here for here, there, _ in found]
     along = max(changes, key=lambda change: float(np.linalg.norm(change)))
     return np.eye(len(slope)) - np.outer(along, slope) / (slope @ along)
-
-
-@cache
-def passage_at(model: Model, mode: str, surface: str, following: str) -> Passage:
-    """Return what the field does between a mode and the following one, on all of the surface between them.
-
-    Judged at random states on the surface, on which both modes slide as they do.
-    """
-    if is_hold(surface) or model.reset_at(mode, surface) is not None:
-        return Passage.JUMP
-    if model.whole_mode(mode) == model.whole_mode(following):
-        return Passage.CONTINUOUS
-    if mode in model.chatter_by_mode:  # left where the force of the wall vanishes
-        return Passage.CONTINUOUS
-    slides = surface in _lies_on(model, following)
-    vector, worst = model.vector({}), Passage.CONTINUOUS
-    for k in range(_SETS):
-        pairs = list(_fields(FlowView(model, vector * _MOVED**k), mode, surface, following))
-        if len(pairs) < 2:
-            return Passage.JUMP
-        here, there = (np.array(fields) for fields in zip(*pairs, strict=True))
-        size = np.max(np.abs(here), axis=0) + np.max(np.abs(there), axis=0)
-        changes = (there - here)[:, size > 0.0] / size[size > 0.0]
-        if np.max(np.abs(changes), initial=0.0) <= _SAME:
-            continue
-        sizes = np.linalg.svd(changes, compute_uv=False)
-        if not slides or np.any(sizes[1:] > _SAME * sizes[0]):
-            return Passage.JUMP
-        worst = Passage.PROJECTED
-    return worst
-
-
-def _lies_on(model: Model, mode: str) -> set[str]:
-    """Return the surfaces that a mode slides on."""
-    whole = model.whole_mode(mode)
-    own = [d.signs for d in model.domains_of(whole)]
-    return {name for name in own[0] if all(signs[name] == 0 for signs in own)}
-
-
-def _fields(
-    view: FlowView, mode: str, surface: str, following: str
-) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Yield the fields of two modes at random states on the surface between them."""
-    model = view.model
-    surfaces = sorted({surface} | _lies_on(model, mode) | _lies_on(model, following))
-    draw = np.random.default_rng(1)
-    wide = np.abs(model.spread(model.mapping(view.vector)))
-    for _ in range(_STATES):
-        t, y = float(draw.uniform(0.0, view.period or 10.0)), draw.uniform(-2.0, 2.0, len(wide))
-        landed = view.landed(surfaces, t, wide * y, _ON)
-        if landed is not None:
-            m = 1 + len(wide)  # the column of the duration
-            yield (
-                view.jacobian(mode, t, landed, 0.0)[:, m],
-                view.jacobian(following, t, landed, 0.0)[:, m],
-            )
