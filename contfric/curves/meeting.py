@@ -18,7 +18,7 @@ from contfric.continuation.points import Point
 from contfric.curves.points import first_curve_point, solve_point
 from contfric.curves.problem import Problem
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.saltation import Passage, passage_at
+from contfric.orbit.passages import Passage, passage_at
 from contfric.orbit.system import EventFunction, Margin, following_modes
 
 #: A rate at an exit below this vanishes with the margin that a bracket has found: that ends some 1e-5 away.
