@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
-from html import escape
 from typing import Any
 
 #: Of each class, the attributes that its table shows; those of its base classes if it is not named.
@@ -56,7 +55,7 @@ class Shown:
     def _repr_html_(self) -> str:
         names = next((_FACTS[c.__name__] for c in type(self).__mro__ if c.__name__ in _FACTS), "")
         rows = "".join(
-            f'<tr><th style="text-align:left">{escape(name.replace("_", " "))}</th>'
+            f'<tr><th style="text-align:left">{_cut(name.replace("_", " "))}</th>'
             f'<td style="text-align:left">{"<br/>".join(lines)}</td></tr>'
             for name in names.split()
             if (lines := [_cut(line) for line in _lines(getattr(self, name))])
@@ -65,6 +64,9 @@ class Shown:
 
 
 def _cut(text: str) -> str:
+    """Return a text for a cell, without its end if it is long."""
+    from html import escape  # a notebook needs it, a run does not
+
     return escape(text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2]} …")
 
 

@@ -12,6 +12,7 @@ from contfric.models.structure_model import ComposedModel
 from contfric.models.structure_modes import Way
 from contfric.orbit.structure import cut_bounds
 from contfric.orbit.tables import (
+    SOLVED,
     Tables,
     bits_of,
     chatter_table,
@@ -23,10 +24,6 @@ from contfric.orbit.tables import (
     sides_of,
     surfaces_under,
 )
-
-#: In a rule, the number that stands for a mode which is solved for, from the state at the joint; numbers
-#: below are those of modes that were not visited yet.
-SOLVED = -2
 
 
 class GrowingTables:

@@ -21,16 +21,17 @@ from contfric.models.definition import FloatArray, Model
 from contfric.models.structure_model import ComposedModel
 from contfric.models.tied import tied
 from contfric.orbit.dense import sample, table
-from contfric.orbit.growing_tables import SOLVED, growing_tables
 from contfric.orbit.pace import Pace
 from contfric.orbit.starts import checked_state, start_of
 from contfric.orbit.system import IntArray
-from contfric.orbit.tables import surfaces_under, tables
+from contfric.orbit.tables import SOLVED, surfaces_under, tables
 from contfric.orbit.time_scale import clock_period, time_scale
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+
+    from contfric.orbit.growing_tables import GrowingTables
 
 #: Hears one line of text now and then.
 Progress = Callable[[str], None]
@@ -251,8 +252,8 @@ def run(
     """
     from contfric.orbit.trajectory import ALL_EVENTS, CARRIED, UNIT, simulate
 
-    composed = isinstance(model, ComposedModel)
-    model_tables = growing_tables(model).tables() if composed else tables(model)
+    growing = _growing_tables(model)
+    model_tables = tables(model) if growing is None else growing.tables()
     began_at, y = (time, y), y.copy()
     pieces: list[EventRows] = []
     done, carry, pace = 0, np.zeros(CARRIED), Pace(_FIRST_EVENTS)
@@ -266,8 +267,7 @@ def run(
         pieces.append(written.first(count))
         done += count
         grown = mode <= SOLVED
-        if grown and isinstance(model, ComposedModel):
-            growing = growing_tables(model)
+        if grown and growing is not None:
             last = int(written.joints[count - 1, 0]), int(written.joints[count - 1, 1])
             mode = growing.visit(mode, last, phase, y, vector)
             model_tables = growing.tables()
@@ -283,6 +283,15 @@ def run(
     columns = modes, exits, found.cycles, found.times, found.states
     how, params = list(SimulationEnd)[end], model.mapping(vector)
     return Trajectory(model, params, *columns, how, at_last, began_at)
+
+
+def _growing_tables(model: Model) -> GrowingTables | None:
+    """Return the tables of a model whose modes come as solutions visit them; None for any other model."""
+    if not isinstance(model, ComposedModel):
+        return None
+    from contfric.orbit.growing_tables import growing_tables  # with all that composes a model
+
+    return growing_tables(model)
 
 
 #: Events that a trajectory goes on for.

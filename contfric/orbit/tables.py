@@ -23,6 +23,9 @@ from contfric.orbit.system import IntArray
 
 #: What a surface is in ``Tables.bounds`` to a mode in which it has a reset.
 MAPPED = 2
+#: In a rule, the number that stands for a mode which is solved for, from the state at the joint; numbers
+#: below are those of modes that were not visited yet (:mod:`contfric.orbit.growing_tables`).
+SOLVED = -2
 #: A rule for the sides of surfaces as bits: (mask, value, mode that follows).
 Rule = tuple[int, int, int]
 

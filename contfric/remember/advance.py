@@ -13,18 +13,19 @@ from __future__ import annotations
 import inspect
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from concurrent.futures import TimeoutError as NotYet
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import wraps
 from threading import Event, Lock
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from contfric.base.memory import processors
 from contfric.base.tally import count_apart
 from contfric.remember.journal import digest_of
 from contfric.remember.stored import UnstorableError, Writer
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -61,6 +62,8 @@ class _Advance:
         if len(self.jobs) > 1:
             return False
         if self.thread is None:
+            from concurrent.futures import ThreadPoolExecutor
+
             self.thread = ThreadPoolExecutor(1, thread_name_prefix="contfric-advance")
         self.jobs.append(self.thread.submit(self._run, function))
         return True
@@ -177,6 +180,8 @@ def foreseeable(*, without: tuple[str, ...] = ()) -> Callable[[Callable[P, R]], 
 
 def _begun(advance: _Advance, key: bytes, compute: Callable[[], R]) -> R:
     """Compute a result in advance, with what it adds to the counts; no more where it is wanted already."""
+    from concurrent.futures import Future
+
     future: Future[Any] = Future()
     with advance.lock:
         known = key in advance.begun
@@ -198,6 +203,8 @@ def _begun(advance: _Advance, key: bytes, compute: Callable[[], R]) -> R:
 
 def _waited_for(advance: _Advance, future: Future[Any], compute: Callable[[], R]) -> R:
     """Return a result that has been begun; one that ends in an error is computed here."""
+    from concurrent.futures import TimeoutError as NotYet
+
     while True:
         try:
             result, added = future.result(_LOOKS)

@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from contfric.models.build import field_of
 from contfric.models.definition import FloatArray, Model
 from contfric.models.view import FlowView
 
@@ -89,6 +88,8 @@ class Probe:
         """Return the rates of all states in a mode."""
         n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
+            from contfric.models.build import field_of
+
             out, field = np.empty(n), field_of(self.model)
             m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
             field(m, t, y, self.vector, none, out, np.empty((0, 0)))
