@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
 
 from contfric.models.definition import Model
 from contfric.orbit.holds import Hold, Itinerary
-from contfric.orbit.passages import Passage, lies_on, passage_at
-from contfric.signature.holds import mirror_exit
 
 
 class Margin(str, Enum):
@@ -76,34 +73,3 @@ def double_zeros(
             stopped = next(h for h in holds if (h.segment + 1) % len(itinerary) == before)
             pairs.append((EventFunction(Margin.EXIT, stopped.segment, stopped.leaves), before))
     return pairs
-
-
-def released_before(
-    model: Model,
-    itinerary: Itinerary,
-    half: bool,
-    joints: Itinerary,
-    tests: Collection[EventFunction],
-) -> Iterator[tuple[EventFunction, int]]:
-    """Yield margins of contacts released just before another one changes, each with the segment between.
-
-    Where the field is continuous at the release a contact leaves with neither speed nor acceleration. So its
-    speed has a double zero where the other one changes at once, and the same sign on both sides of that: the
-    order of the two is watched by the margin of the other one at the release.
-
-    Parameters
-    ----------
-    joints : the mode before each segment, and the surface between
-    """
-    for i, (mode, exit_) in enumerate(itinerary):
-        before, left = joints[i]
-        order = exit_
-        if i == 0 and half and model.symmetry is not None:  # the release is a mirror image
-            order = mirror_exit(exit_, {b: a for a, b in model.symmetry.surfaces.items()})
-        watched = EventFunction(Margin.JOINT, (i - 1) % len(itinerary), order)
-        for surface in sorted(lies_on(model, before) - lies_on(model, mode)):
-            margin = EventFunction(Margin.JOINT, i, surface)
-            if not (margin in tests and watched in tests):
-                continue
-            if passage_at(model, before, left, mode) is Passage.CONTINUOUS:
-                yield margin, i

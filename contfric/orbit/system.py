@@ -15,8 +15,7 @@ A hold (:mod:`contfric.orbit.holds`) has a pin at its start in the place of the 
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
 one that follows a stick must last, and so must that stick, whose end is tangential, and a slide that leads
 from one hold to the touch of another (LASTING). Where such a segment shrinks to nothing, other margins have a
-double zero: they are divided by the square of its duration, for what is left of them is their sign. So is the
-speed of a contact that is released just before another one changes.
+double zero: they are divided by the square of its duration, for what is left of them is their sign.
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -25,7 +24,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -35,13 +33,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.begins import beginnings, entry_rows, joints_before
 from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
-from contfric.orbit.margins import (
-    EventFunction,
-    Margin,
-    double_zeros,
-    lasting_segments,
-    released_before,
-)
+from contfric.orbit.margins import EventFunction, Margin, double_zeros, lasting_segments
 from contfric.orbit.structure import (
     ending_sides,
     exit_domains,
@@ -220,10 +212,7 @@ def build_system(
         doubles=_rows(
             [
                 (tests.index(t), i)
-                for t, i in chain(
-                    double_zeros(model, itinerary, half, holds),
-                    released_before(model, itinerary, half, joints, frozenset(tests)),
-                )
+                for t, i in double_zeros(model, itinerary, half, holds)
                 if t in tests
             ],
             2,
