@@ -23,7 +23,7 @@ MASSES, CONTACTS = 20, (1, 2, 3, 4, 6, 8, 10)
 COUPLING, DAMPING, KINETIC, OMEGA, RANGE = 0.5, 0.02, 0.03, 1.0, (0.999, 1.03)
 MAX_STEP = 0.01
 #: Seeds of structures with random data, and how far to either side of the lowest natural frequency.
-SEEDS, WIDTH = (0, 1, 2), 0.03
+SEEDS, WIDTH = (0, 1, 2, 3, 4, 6), 0.03
 
 
 @dataclass(frozen=True)

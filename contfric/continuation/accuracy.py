@@ -135,12 +135,15 @@ class Estimate:
         lasts = here.durations
         length, change = self.point.arc - before.arc, self.point.value - before.value
         none = int(np.sum(lasts < _NO_LENGTH * time_unit(here)))
-        if error is None or error < rough or none < 2 or not length > 0.0 or change == 0.0:
+        if error is None or error < rough or none < 2:
             return error
         unknown = _LENGTHS * float(np.cbrt(here.model.rounding))
-        if length < unknown:  # the point before is no better known
-            own = abs(change) + unknown**2 * (1.0 + abs(self.point.value))
+        if length < unknown:  # the point before is no better known, or is the located one itself
+            slope = max(abs(before.slope), abs(self.point.slope))  # 2 c d, and what is left is c d^2
+            own = abs(change) + unknown * min(2.0 * slope, unknown * (1.0 + abs(self.point.value)))
             return min(error, max(rough, own))
+        if change == 0.0:
+            return error
         bends = before.slope * length / (2.0 * change)
         if not 1.0 / _OFF_PARABOLA < bends < _OFF_PARABOLA:
             return error

@@ -312,8 +312,10 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
         found = nearly_reached(orbit, tip, settings)
         if found is None or not _has_fallen(side, orbit, int(k), found):
             continue
-        # it lies within the step over which the branch turns
-        known = max(ROUGH, 2.0 * float(steps[k - first]) / settings.width)
+        # it lies within the step over which the branch turns, on either of the two ways
+        step, change = float(steps[k - first]), float(rows.w[k + 1, 0] - tip.value)
+        change = max(abs(change), step * abs(tip.slope)) + step**2 * (1.0 + abs(tip.value))
+        known = max(ROUGH, 2.0 * change / settings.width)
         side.rewind(int(k))
         side.end = End(EndReason[found.kind.name], bifurcation=replace(found, bound=known))
         return True
