@@ -139,7 +139,8 @@ class Estimate:
             return error
         unknown = _LENGTHS * float(np.cbrt(here.model.rounding))
         if length < unknown:  # the point before is no better known, or is the located one itself
-            slope = max(abs(before.slope), abs(self.point.slope))  # 2 c d, and what is left is c d^2
+            # the slope is 2 c d, and what is left is c d^2
+            slope = max(abs(before.slope), abs(self.point.slope))
             own = abs(change) + unknown * min(2.0 * slope, unknown * (1.0 + abs(self.point.value)))
             return min(error, max(rough, own))
         if change == 0.0:
