@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -254,21 +255,23 @@ def margin_sizes(orbit: Orbit) -> list[float]:
 
     Heights have units, so that a height in metres may be a millionth of that in micrometres.
     """
-    places = list(orbit.ends)
+    flow, surfaces = orbit.flow, orbit.model.surface_by_name
+    places = [(float(end[0]), end[1:]) for end in orbit.ends]
     for i, lasts in enumerate(orbit.durations.tolist()):  # a velocity is zero at all joints
         later = _SHARES[0] * lasts
-        places.append(np.append(orbit.begins[i, 0] + later, state_within(orbit, i, later)))
-    heights: dict[str, float] = {}
-    sizes = []
-    for test in orbit.system.tests:
-        if test.margin not in (Margin.JOINT, Margin.INTERIOR):
-            sizes.append(1.0)
-            continue
-        if test.surface not in heights:
-            values = [orbit.flow.height(test.surface, float(e[0]), e[1:]) for e in places]
-            heights[test.surface] = max(map(abs, values), default=0.0) or 1.0
-        sizes.append(heights[test.surface])
-    return sizes
+        places.append((float(orbit.begins[i, 0]) + later, state_within(orbit, i, later)))
+
+    @cache
+    def values(observable: str) -> list[float]:
+        return [flow.observe(observable, t, y) for t, y in places]
+
+    @cache
+    def size(surface: str) -> float:
+        level = flow.level(surface)
+        return max(abs(value - level) for value in values(surfaces[surface].observable)) or 1.0
+
+    heights = (Margin.JOINT, Margin.INTERIOR)
+    return [size(t.surface) if t.margin in heights else 1.0 for t in orbit.system.tests]
 
 
 def is_linear(test: EventFunction, orbit: Orbit) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -160,20 +160,21 @@ def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> floa
     return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])
 
 
+@lru_cache(maxsize=8)  # an event asks for its kind and its accuracy, at one orbit
 def rate_scale(orbit: Orbit, mode: str, surface: str) -> float:
     """Return how fast a surface's observable changes in a mode along an orbit: what its rates are small to.
 
     The largest rate at the joints, and at their states at other phases of the excitation, or the height over
     the surface in a period.
     """
-    shifts = np.arange(_PHASES) / _PHASES * (0.0 if orbit.model.autonomous else orbit.period)
+    flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
+    phases = range(1 if orbit.model.autonomous else _PHASES)
     largest = 0.0
-    for joint in orbit.ends:
-        height = orbit.flow.height(surface, float(joint[0]), joint[1:])
-        largest = max(largest, abs(height) / orbit.period)
-        for shift in shifts.tolist():
-            later = np.concatenate([[joint[0] + shift], joint[1:]])
-            largest = max(largest, abs(rate_along(orbit, mode, surface, later)))
+    for end in orbit.ends:
+        time, y = float(end[0]), end[1:]
+        times = [time + k / _PHASES * orbit.period for k in phases]
+        rates = [abs(flow.rate(mode, observable, t, y)) for t in times]
+        largest = max(largest, abs(flow.height(surface, time, y)) / orbit.period, *rates)
     return largest
 
 
