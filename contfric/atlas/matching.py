@@ -162,7 +162,7 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
         return _in_family(orbit, branch, mirror)
     for _, guess in guesses(branch, orbit.vector, value):
         solved = refine(guess, damped=False)
-        if solved.status is Status.NOT_FINITE:  # a neuron that blows up just behind its threshold
+        if solved.status is Status.NOT_FINITE:  # a neuron that blows up just above its threshold
             solved = refine(ended_at_surfaces(guess), damped=False)
         same = _SAME_ORBIT * (1.0 + float(np.abs(orbit.stops).max(initial=0.0)))
         alike = solved.converged and stops_distance(orbit.stops, solved.stops, mirror) < same

@@ -252,8 +252,8 @@ def crossing_between(
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
     step, here = float(np.sqrt(square)), near.orbit(orbit, active)
-    beside = _BESIDE * step + _blur(near, orbit.model.rounding)
-    crossing = crossing_near(here, settings, 2.0 * (step + beside))
+    blurred = _BESIDE * step + _blur(near, orbit.model.rounding)
+    crossing = crossing_near(here, settings, 2.0 * (step + blurred))
     if crossing is None:
         return None
     way = (
@@ -261,8 +261,8 @@ def crossing_between(
         float(crossing.orbit.vector[active]) - before.value,
     )
     at = _product(chord, way, settings.scale) / square
-    far = np.sqrt(_product(way, way, settings.scale)) > step + beside
-    if far or not -beside < at * step < step + beside:
+    far = np.sqrt(_product(way, way, settings.scale)) > step + blurred
+    if far or not -blurred < at * step < step + blurred:
         return None
     arc = min(1.0, max(0.0, at)) * (after.arc - before.arc)
     return crossing, crossing_point(crossing, before, arc, settings)

@@ -53,11 +53,11 @@ def undeclared_angles(probe: Probe) -> dict[str, str]:
     found = {}
     for state in (s for s in model.states if s not in known):
         step = np.array([float(s == state) for s in model.states])
-        here, turned, beside = (
+        here, turned, nearby = (
             [probe.field(mode, t, y + turn * step) for mode, t, y in places]
             for turn in (0.0, 2.0 * np.pi, 1.0)
         )
-        if not all(map(_same, here, turned)) or all(map(_same, here, beside)):
+        if not all(map(_same, here, turned)) or all(map(_same, here, nearby)):
             continue
         met = [
             [abs(probe.flow.observe(wall, t, y + turn * step)) for _, t, y in places]
