@@ -95,21 +95,28 @@ def locate(
 def locate_twice(
     problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
 ) -> tuple[Point, bool]:
-    """Return the location of a change, and whether another bracket finds it at the same parameters.
+    """Return the location of a change, and whether another bracket finds it at the same parameters."""
+    point, fine = locate(problem, a, b, border, sought)
+    return point, fine and found_again(problem, a, b, border, sought, point)
+
+
+def found_again(
+    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought, point: Point
+) -> bool:
+    """Tell whether another bracket finds a location at the same parameters.
 
     Where another curve of the same condition passes through, or conditions degenerate, Newton's method is
     singular: each bracket closes to its last digits, and each somewhere else.
     """
-    point, fine = locate(problem, a, b, border, sought)
-    if not fine or not a.arc < point.arc < b.arc:
-        return point, fine
+    if not a.arc < point.arc < b.arc:
+        return True
     share = _SHORTER * (point.arc - a.arc) / (b.arc - a.arc)
     start = point_between(problem, a, b, share, border)
     if start is None:
-        return point, False
+        return False
     again, fine = locate(problem, start, b, border, sought)
     gap = float(np.max(np.abs(again.w - point.w) / problem.box.widths))
-    return point, fine and gap < _SAME_LOCATION
+    return fine and gap < _SAME_LOCATION
 
 
 def by_test(index: int) -> Sought:

@@ -10,7 +10,7 @@ import numpy as np
 from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point
-from contfric.curves.locating import by_label, by_test, locate, locate_twice
+from contfric.curves.locating import by_label, by_test, found_again, locate, locate_twice
 from contfric.curves.meeting import at_once
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
@@ -64,11 +64,12 @@ def _margins(
     located = []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate_twice(problem, before, after, border, by_test(index))
+        point, fine = locate(problem, before, after, border, by_test(index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
     _, first, point, fine = min(located, key=lambda entry: entry[0])
+    fine = fine and found_again(problem, before, after, border, by_test(first), point)
     point, fine = at_once(problem, point, fine, tests[first])
     orbit = problem.orbit(point.joints, point.w)
     kind = kind_of_margin(problem.system, tests[first], orbit)
