@@ -17,6 +17,7 @@ from contfric.continuation.candidates import candidates
 from contfric.continuation.events import TERMINAL, Bifurcation, Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point, PointRows
+from contfric.curves.births import is_simpler
 from contfric.curves.meeting import has_multiplier
 from contfric.curves.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
@@ -149,19 +150,20 @@ def _tangency_again(test: EventFunction, one: Orbit, other: Orbit) -> Bifurcatio
 
 
 @remembered()
-def goes_on(problem: Problem, tip: Point, special: SpecialPoint, largest: float) -> Start | None:
-    """Return where a curve goes on after a sliding event, in the direction that it has; None if nowhere.
+def goes_on(
+    problem: Problem, ahead: FloatArray, special: SpecialPoint, largest: float
+) -> Start | None:
+    """Return where a curve goes on after a sliding event, in the direction ``ahead``; None if nowhere.
 
     What goes on happens at as many locations as before: a curve that is asymmetric does not go on as the
     symmetric one that it has met.
     """
-    ahead = tip.direction / problem.box.widths
     for orbit in itineraries_at(special):
         event = again(problem, special, orbit)
         if event is None:
             continue
         for start in starts_of(event, problem.box, largest):
-            forward = float(np.sum(start[1].direction / problem.box.widths * ahead)) > 0.0
+            forward = float(np.sum(start[1].direction * ahead / problem.box.widths**2)) > 0.0
             if forward and _locations(start[0]) == _locations(problem):
                 return start
     return None
@@ -212,7 +214,7 @@ def prove(
         others[still] = False
         lasts = bool(np.all(orbit.durations > -_NO_TIME))
         fine = lasts and bool(np.all(margins[others] > 0.0)) and has_multiplier(problem, orbit)
-        if not fine or _is_exit(problem, still):
+        if not fine or _is_exit(problem, still) or is_simpler(problem, orbit):
             continue
         if not born and is_continuum(problem, start) and is_continuum(problem, beside):
             return None

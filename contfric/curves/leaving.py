@@ -3,7 +3,8 @@
 ==================================  ============================================================
 point                               curves that leave
 ==================================  ============================================================
-a smooth event on a sliding one     the curve of SN, BP or PD
+a smooth event on a sliding one     the curve of SN, BP or PD; where asymmetric (doubled) orbits become
+                                    symmetric (undoubled), that of the sliding event of those
 a sliding event on a smooth one     the curve of the sliding event, both ways
 two sliding events                  in every itinerary that can follow either or both of them: the
                                     curve of each margin that vanishes there, where admissible
@@ -31,6 +32,7 @@ from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.outcomes import outcome_at
 from contfric.continuation.points import Point
 from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.curves.births import simpler_problem
 from contfric.curves.curve import CurvePart
 from contfric.curves.going_on import Start, itineraries_at, prove, starts_of
 from contfric.curves.points import solve_point
@@ -62,8 +64,19 @@ def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator
         event = special.bifurcation()
         if event is not None:
             yield from starts_of(event, box, largest)
+        yield from _of_simpler(special, problem, largest)
     elif special.meets in TERMINAL:
         yield from _sliding(special, problem, largest)
+
+
+def _of_simpler(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
+    """Yield the curve of the same event of symmetric (undoubled) orbits, where orbits become those."""
+    found = simpler_problem(problem, special.orbit)
+    if found is not None and found[0].test is not None:
+        own, part = found
+        yield from starts_of(
+            Bifurcation(own.kind, part.params, part, (own.test,)), problem.box, largest
+        )
 
 
 def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:

@@ -55,7 +55,9 @@ def at_once(problem: Problem, point: Point, fine: bool, test: EventFunction) -> 
     exit_ = _regular_exit(problem, point, test)
     if exit_ is None:
         return point, fine
-    found = _both(problem, _of_exit(problem, exit_), point)
+    found = with_multiplier(
+        _of_exit(problem, exit_), problem.orbit(point.joints, point.w), problem.condition.sign
+    )
     if found is None:
         return point, False
     tests = point.tests.copy()
@@ -86,11 +88,11 @@ def _of_exit(problem: Problem, exit_: EventFunction) -> Problem:
     return replace(problem, condition=condition, test=exit_)
 
 
-def _both(problem: Problem, own: Problem, near: Point) -> Point | None:
-    """Return the point of an exit's curve at which orbits have the multiplier, by the secant method."""
+def with_multiplier(own: Problem, near: Orbit, sign: float) -> Point | None:
+    """Return the point of a margin's curve at which orbits have a multiplier, by the secant method."""
     from scipy.optimize import root_scalar
 
-    first = first_curve_point(own, own.orbit(near.joints, near.w))
+    first = first_curve_point(own, near)
     if first is None:
         return None
     (start, border), last = first, first[0]
@@ -102,10 +104,10 @@ def _both(problem: Problem, own: Problem, near: Point) -> Point | None:
         if point is None:
             return float("nan")
         last = point
-        return multiplier_left(own.orbit(point.joints, point.w), problem.condition.sign)
+        return multiplier_left(own.orbit(point.joints, point.w), sign)
 
     found = root_scalar(
         value_at, method="secant", x0=0.0, x1=_FIRST, xtol=_CONVERGED, maxiter=_MOST
     )
-    moved = np.max(np.abs(last.w - near.w) / problem.box.widths)
+    moved = np.max(np.abs(last.w - near.vector[own.which]) / own.box.widths)
     return last if found.converged and moved < _SAME_POINT else None

@@ -10,6 +10,7 @@ import numpy as np
 from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point
+from contfric.curves.births import end_of_asymmetry
 from contfric.curves.locating import by_label, by_test, found_again, locate, locate_twice
 from contfric.curves.meeting import at_once
 from contfric.curves.problem import Problem
@@ -73,6 +74,9 @@ def _margins(
     point, fine = at_once(problem, point, fine, tests[first])
     orbit = problem.orbit(point.joints, point.w)
     kind = kind_of_margin(problem.system, tests[first], orbit)
+    ended = end_of_asymmetry(problem, point, tests[first]) if kind is problem.kind else None
+    if ended is not None:
+        return [LocatedChange(*ended, True)]
     group = tuple(
         test
         for k, test in enumerate(tests)

@@ -47,6 +47,15 @@ class CurveSide:
         return self.points[-1]
 
     @property
+    def ahead(self) -> FloatArray:
+        """Direction in the plane in which it came to its tip.
+
+        The tip's own tangent may be singular: where a margin that ends a curve is an exit's rate.
+        """
+        came = next((p for p in self.points[-2::-1] if np.any(p.w != self.tip.w)), None)
+        return self.tip.direction if came is None else self.tip.w - came.w
+
+    @property
     def last(self) -> CurveSide:
         """What it goes on as at its very end."""
         return self if self.following is None else self.following.last

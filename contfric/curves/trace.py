@@ -191,7 +191,7 @@ def trace_curve_side(
     meets = side.end.reason is CurveEndReason.MEETS and len(passed) <= _MOST_CHANGES
     if meets and special is not None:
         try:
-            on = goes_on(problem, side.tip, special, largest)
+            on = goes_on(problem, side.ahead, special, largest)
         except KeyboardInterrupt:
             if not keep:
                 raise
