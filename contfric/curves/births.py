@@ -117,8 +117,8 @@ def end_of_asymmetry(
     exact = with_multiplier(own, part, -1.0)
     if exact is None:
         return None
-    half = own.orbit(exact.joints, exact.w)
-    whole, meets = (half.as_whole(), Kind.BP) if half.system.half else (half.doubled(), Kind.PD)
+    orbit = own.orbit(exact.joints, exact.w)
+    whole, meets = (orbit.as_whole(), Kind.BP) if orbit.system.half else (orbit.doubled(), Kind.PD)
     joints = whole.joints.copy()
     if not problem.model.autonomous:
         turns = np.round((point.joints[0, 0] - joints[0, 0]) / whole.period)
@@ -126,6 +126,6 @@ def end_of_asymmetry(
     last = replace(point, joints=joints, w=exact.w)
     name = f"{problem.kind.value}-{meets.value}"
     special = SpecialPoint(
-        CodimTwo.MEETS, name, half.params, problem.orbit(joints, exact.w), meets, (), point.arc
+        CodimTwo.MEETS, name, orbit.params, problem.orbit(joints, exact.w), meets, (), point.arc
     )
     return last, special

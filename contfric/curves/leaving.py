@@ -72,11 +72,10 @@ def leaving(special: SpecialPoint, problem: Problem, largest: float) -> Iterator
 def _of_simpler(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
     """Yield the curve of the same event of symmetric (undoubled) orbits, where orbits become those."""
     found = simpler_problem(problem, special.orbit)
-    if found is not None and found[0].test is not None:
-        own, part = found
-        yield from starts_of(
-            Bifurcation(own.kind, part.params, part, (own.test,)), problem.box, largest
-        )
+    own, part = found or (problem, special.orbit)
+    if found is not None and own.test is not None:
+        event = Bifurcation(own.kind, part.params, part, (own.test,))
+        yield from starts_of(event, problem.box, largest)
 
 
 def _sliding(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[Start]:
