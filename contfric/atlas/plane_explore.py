@@ -51,6 +51,8 @@ _NOWHERE = 1e-5
 #: Points of a curve by which it is told whether it is known: so many steps, which grow from the first, lead
 #: well away from where curves meet.
 _FIRST = 16
+#: Margins below this vanish: those of events that are located twice agree to 1e-8 or so.
+_VANISHES = 1e-6
 #: Where a curve ends for no reason of its own.
 _BROKEN_OFF = {
     CurveEndReason.STEP,
@@ -296,6 +298,8 @@ def _follow_starts(
         is_known(side.problem, _inner(side), state.curves) is not None for side in sides
     ):
         return
+    if all(_is_degenerate(side) for side in sides):
+        return
     if len(sides) == 2:
         state.add(join_sides(sides[1], sides[0]), sides)
         return
@@ -306,6 +310,21 @@ def _follow_starts(
     there = replace(special, orbit=problem.orbit(start.joints, start.w), tests=())
     first = CurveEnd(CurveEndReason.START, special=there)
     state.add(join_sides(None, sides[0], first), sides)
+
+
+def _is_degenerate(side: CurveSide) -> bool:
+    """Tell whether another margin vanishes all along a side: the curve is that of two events at once.
+
+    Its equations are singular, where it goes is rounding, and it ends at the first sign that this has.
+    Without damping Omega = 1/2 is such a line: a CS and an AS of a continuum of orbits happen there at once.
+    """
+    longest, piece = side, side.following
+    while piece is not None:
+        longest = max(longest, piece, key=lambda s: s.tip.arc - s.points[0].arc)
+        piece = piece.following
+    margins = _inner(longest).tests[: len(longest.problem.system.tests)]
+    others = np.abs(np.delete(margins, longest.problem.condition.pinned))
+    return bool(np.min(others, initial=np.inf) < _VANISHES)
 
 
 def _begins_known(state: PlaneExploration, start: Start) -> bool:

@@ -57,6 +57,31 @@ def test_known_curves_of_random_planes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert known > 10
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_points_do_not_depend_on_the_step(seed: int) -> None:
+    """Points that are located are found with another step, also where Omega = 1/2 is a continuum."""
+    rng = np.random.default_rng(seed)
+    offset = rng.uniform(0.3, 0.5)
+    params = {"Omega": 0.55, "S": rng.uniform(0.5, 0.8) * offset, "S0": offset}
+    params["h"] = rng.choice([0.0, rng.uniform(-0.05, 0.05)])
+    ranges = {"Omega": (0.45, 0.65), "S0": (params["S"], params["S"] + 0.2)}
+    orbit = cf.find_orbit("coulomb", params)
+    found = []
+    for step in (None, 0.0037):
+        plane = cf.explore_plane(
+            orbit, ("Omega", "S0"), ranges, max_periods=1, max_sections=2, max_step=step
+        )
+        assert len(plane.curves) < 15  # Omega = 1/2 is no heap of short curves
+        points = [s for curve in plane.curves for s in curve.special]
+        found.append([(s.params["Omega"], s.params["S0"], s.located) for s in points])
+    assert any(located for *_, located in found[0])
+    for some, others in (found, found[::-1]):
+        for omega, load, located in some:
+            near = [abs(o - omega) + abs(v - load) < 1e-7 for o, v, _ in others]
+            assert any(near) or not located
+
+
 def test_whole_orbits_are_found_on_the_branches_of_their_halves() -> None:
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     diagram = cf.explore(orbit, "Omega", (0.4, 0.6))
