@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -25,7 +25,8 @@ class SchemaPart(BaseModel):
     """A mapping of a YAML file: no other keys than its own, and no types but these.
 
     The description of a field is what its value must be: messages say "'key' must be {description}".
-    ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key.
+    ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key, and
+    "item": what is said of one of a list.
     """
 
     model_config = ConfigDict(
@@ -82,8 +83,13 @@ def validated(located: LocatedYaml, schema: type[_Schema], data: Any = None) -> 
     try:
         return schema.model_validate(given)
     except ValidationError as error:
-        entry = _cause(error, given)
-        located.fail(_place(given, entry["loc"]), _message(entry, schema, given))
+        located.fail(*explained(error, schema, given))
+
+
+def explained(error: ValidationError, schema: type[BaseModel], data: Any) -> tuple[Address, str]:
+    """Return the place of the first mistake in data, and what is wrong with it and what would be valid."""
+    entry = _cause(error, data)
+    return _place(data, entry["loc"]), _message(entry, schema, data)
 
 
 def keys_of(schema: type[BaseModel]) -> str:
@@ -150,14 +156,19 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
     wanted = info.description if info else "as the guide says"
     if entry["type"] == "missing":
         return f"key '{key}' is missing; it must be {wanted}"
-    if entry["type"] == "enum" and info is not None:
-        names = [str(member.value) for kind in _kinds(info.annotation, Enum) for member in kind]
+    if entry["type"] in ("enum", "literal_error") and info is not None:
+        names = _values(info.annotation)
         return f"'{key}' has no '{given}'{did_you_mean(str(given), names)}"
-    last = next((k for k in reversed(_place(data, address)) if isinstance(k, str)), key)
+    place = _place(data, address)
+    last = next((step for step in reversed(place) if isinstance(step, str)), key)
     extra = info.json_schema_extra if info else None
-    if last != key and isinstance(extra, dict) and "entry" in extra:
-        return f"{str(extra['entry']).format(last)}, got {_given(given)}"
-    return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{_given(given)}"
+    said: dict[str, Any] = extra if isinstance(extra, dict) else {}
+    got = _given(given) + (comma_hint(last, given) if last != key else "")
+    if "item" in said and last != place[-1] and entry["type"] != "list_type":
+        return f"{said['item']}, got {got}"
+    if "entry" in said and last != key:
+        return f"{said['entry'].format(last)}, got {got}"
+    return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{got}"
 
 
 def _belongs(unknown: str, part: type[BaseModel]) -> str:
@@ -173,6 +184,8 @@ def _belongs(unknown: str, part: type[BaseModel]) -> str:
 
 def _given(value: object) -> str:
     """Return a value and, where YAML may surprise, why it is what it is."""
+    if value is None:
+        return "nothing"
     try:
         text = f"{reprlib.repr(value)} ({type(value).__name__})"
     except ValueError:  # a number of more digits than Python writes
@@ -195,6 +208,7 @@ def _described(
 ) -> tuple[type[BaseModel], str, FieldInfo | None]:
     """Return the innermost part that an address leads through, its last known key, and the field."""
     part, key, info = schema, str(address[0]) if address else "", None
+    below: list[type[BaseModel]] = []
     for step in address:
         found = _fields(part).get(str(step))
         if found is not None:
@@ -203,7 +217,17 @@ def _described(
             if not below:
                 break
             part = below[0]
+        else:  # of parts that are told apart, the one that was tried has its name in the address
+            part = next((kind for kind in below if kind.__name__ == step), part)
     return part, key, info
+
+
+def _values(annotation: Any) -> list[str]:
+    """Return the names that an annotation lists."""
+    if get_origin(annotation) is Literal:
+        return [str(value) for value in get_args(annotation)]
+    members = [str(member.value) for kind in _kinds(annotation, Enum) for member in kind]
+    return members or [name for part in get_args(annotation) for name in _values(part)]
 
 
 _Kind = TypeVar("_Kind")

@@ -59,14 +59,14 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
     data: dict[str, Any] = {
         "name": name,
         COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
-        "parameters": _plain({} if parameters is None else parameters),
+        "parameters": {} if parameters is None else parameters,
         "mass": mass,
         "damping": damping,
         "stiffness": stiffness,
-        "force": _plain({} if force is None else force),
-        "contacts": _plain(contacts),
+        "force": {} if force is None else force,
+        "contacts": contacts,
         **({"period": period} if period else {"autonomous": True}),
-        **{key: _plain(value) for key, value in more.items()},
+        **more,
     }
     try:
         return built(describe(data))
@@ -84,18 +84,6 @@ def _size(*matrices: Any) -> int:
         "none of these matrices has rows, so they do not say how many coordinates there are: "
         "give 'stiffness' as rows, or coordinates=['q1', ...]"
     )
-
-
-def _plain(value: Any) -> Any:
-    """Return what a file could say: mappings as dictionaries, numbers of numpy as Python's, arrays as lists.
-
-    What an entry has to be is checked where files are read, whatever it is here.
-    """
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    return value
 
 
 def _rows(matrix: Any) -> Any:

@@ -111,19 +111,14 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
         If a tie is not an expression of other parameters.
     """
     from contfric.errors import ModelError
-    from contfric.models.entries import EntryError, constraints_in
+    from contfric.models.entries import EntryError
     from contfric.models.grammar import names_in, parse
 
-    given = data.get("parameters")
-    parameters = given if isinstance(given, Mapping) else {}
-    ties = {
-        str(name): str(value[_TIE])
-        for name, value in parameters.items()
-        if isinstance(value, Mapping) and _TIE in value
-    }
+    parameters = data["parameters"]
+    ties = {name: entry[_TIE] for name, entry in parameters.items() if _TIE in entry}
     if not ties:
         return data
-    left = [str(name) for name in parameters if name not in ties]
+    left = [name for name in parameters if name not in ties]
     for name, text in ties.items():
         try:
             foreign = sorted(names_in(parse(text)) - {"pi", *left})
@@ -135,20 +130,7 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
                 ("parameters", name),
                 f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
             )
-    whole: dict[str, Any] = {
-        "define": {},
-        "observables": {},
-        "spread": {},
-        "surfaces": {},
-        "modes": {},
-        "resets": {},
-    }
-    plain = {
-        **whole,
-        **{k: v for k, v in data.items() if v is not None},
-        "constraints": constraints_in(data),
-    }
-    return _substituted(plain, ties)
+    return _substituted(data, ties)
 
 
 def _named(name: str, ties: Mapping[str, str]) -> str:
