@@ -68,6 +68,9 @@ def _said(limits: str, what: str) -> str:
 
 #: What pydantic calls a key that a part does not have; the second is no text.
 _UNKNOWN = ("extra_forbidden", "invalid_key")
+#: What it calls a part whose kind is none, and something else in the place of a mapping.
+_NO_KIND = ("union_tag_invalid", "union_tag_not_found")
+_NO_MAPPING = ("dict_type", "model_type", "model_attributes_type")
 
 _Schema = TypeVar("_Schema", bound=BaseModel)
 
@@ -89,7 +92,8 @@ def validated(located: LocatedYaml, schema: type[_Schema], data: Any = None) -> 
 def explained(error: ValidationError, schema: type[BaseModel], data: Any) -> tuple[Address, str]:
     """Return the place of the first mistake in data, and what is wrong with it and what would be valid."""
     entry = _cause(error, data)
-    return _place(data, entry["loc"]), _message(entry, schema, data)
+    own = entry["ctx"]["discriminator"].strip("'") if entry["type"] in _NO_KIND else ""
+    return _place(data, (*entry["loc"], own)), _message(entry, schema, data)
 
 
 def keys_of(schema: type[BaseModel]) -> str:
@@ -153,6 +157,12 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
         hint = comma_hint(unknown, given) or _belongs(unknown, part)
         hint = hint or did_you_mean(unknown, _fields(part))
         return f"unknown key '{unknown}'{hint}"
+    if entry["type"] in _NO_KIND and info is not None:
+        own, tag = entry["ctx"]["discriminator"], entry["ctx"].get("tag")
+        names = [v for kind in _kinds(info.annotation, BaseModel) for v in _tags(kind)[1:]]
+        if tag is None:
+            return f"key {own} is missing; it must be {', '.join(names[:-1])} or {names[-1]}"
+        return f"{own} has no '{tag}'{did_you_mean(tag, names)}"
     wanted = info.description if info else "as the guide says"
     if entry["type"] == "missing":
         return f"key '{key}' is missing; it must be {wanted}"
@@ -163,10 +173,13 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
     last = next((step for step in reversed(place) if isinstance(step, str)), key)
     extra = info.json_schema_extra if info else None
     said: dict[str, Any] = extra if isinstance(extra, dict) else {}
-    got = _given(given) + (comma_hint(last, given) if last != key else "")
+    got = _given(given)
+    if last != key:
+        near = did_you_mean(last, _fields(part)) if part.model_config["extra"] == "allow" else ""
+        got += comma_hint(last, given) or (near if near.startswith(";") else "")
     if "item" in said and last != place[-1] and entry["type"] != "list_type":
-        return f"{said['item']}, got {got}"
-    if "entry" in said and last != key:
+        return f"{said['item'].format(key)}, got {got}"
+    if "entry" in said and last != key and entry["type"] not in _NO_MAPPING:
         return f"{said['entry'].format(last)}, got {got}"
     return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{got}"
 
@@ -218,8 +231,13 @@ def _described(
                 break
             part = below[0]
         else:  # of parts that are told apart, the one that was tried has its name in the address
-            part = next((kind for kind in below if kind.__name__ == step), part)
+            part = next((kind for kind in below if step in _tags(kind)), part)
     return part, key, info
+
+
+def _tags(kind: type[BaseModel]) -> list[str]:
+    """Return by which names a part is told from others: that of its class, or a value that it must have."""
+    return [kind.__name__, *(v for f in kind.model_fields.values() for v in _values(f.annotation))]
 
 
 def _values(annotation: Any) -> list[str]:

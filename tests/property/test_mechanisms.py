@@ -219,7 +219,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"stiffness": np.eye(2) * (1.0 + 1.0j)}, "stiffness -> 0 -> 0: an entry of 'stiffness'"),
     ({"contacts": {"a": WALL | {"gap": "1 - v1"}}}, "made of coordinates, .* such as 0.1 - q1"),
     ({"force": {"q3": "1"}}, "unknown key 'q3'"),
-    ({"contacts": {"a": {"kind": "glue", "velocity": "v1"}}}, "'kind' has no 'glue'. Valid: friction, jenkins"),
+    (
+        {"contacts": {"a": {"kind": "glue", "velocity": "v1"}}},
+        "'kind' has no 'glue'. Valid: friction, jenkins",
+    ),
     (
         {"contacts": {"a": {"kind": "friction", "velocity": "v7", "kinetic": "S"}}},
         "unknown name 'v7'",
@@ -262,7 +265,10 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"period": "0"}, "period: a period is above 0; '0' is 0 at the defaults"),
     ({"period": "-2*pi"}, "period: a period is above 0"),
     ({"mass": 1, "damping": 1, "stiffness": "k", "coordinates": None}, "give 'stiffness' as rows"),
-    ({"mass": [[1.0, 0.0], [0.0, float("nan")]]}, "mass -> 1 -> 1: an entry of 'mass' must be an expression or a finite number"),
+    (
+        {"mass": [[1.0, 0.0], [0.0, float("nan")]]},
+        "mass -> 1 -> 1: an entry of 'mass' must be an expression or a finite number",
+    ),
     (
         {"contacts": {"a": WALL | {"restitution": -0.2}}},
         "contacts -> a -> restitution: .* at least 0",
