@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.describe import describe, from_text
 from contfric.models.description import Description
 from contfric.models.entries import EntryError
 from contfric.models.matrices import loaded
@@ -50,8 +49,15 @@ def _described(data: dict[str, Any]) -> str:
     try:
         source = repr(data)
     except ValueError:  # a number of more digits than Python prints: whoever reads it says so
-        return describe(data).text
-    return derived("text", source, lambda: describe(data).text)
+        return _read_as_text(data)
+    return derived("text", source, lambda: _read_as_text(data))
+
+
+def _read_as_text(data: dict[str, Any]) -> str:
+    # what reads a model is loaded where one is read, and not where it was read before
+    from contfric.models.describe import describe
+
+    return describe(data).text
 
 
 def _written_at(located: LocatedYaml, address: Address) -> Address:
@@ -93,6 +99,7 @@ def model_of(definition: str) -> Model:
 def _model_from(definition: str) -> Model:
     from contfric.models.build import prepare
     from contfric.models.derive import model_from
+    from contfric.models.describe import from_text
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place
