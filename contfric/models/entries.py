@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
@@ -18,6 +19,16 @@ class EntryError(ModelError):
     def __init__(self, address: Address, message: str) -> None:
         super().__init__(message)
         self.address = address
+
+
+def plain(value: Any) -> Any:
+    """Return data as a YAML file has them: keys are texts, arrays and tuples are lists, numbers Python's."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    array = value.toarray() if hasattr(value, "toarray") else value  # of scipy's sparse matrices
+    return array.tolist() if hasattr(array, "tolist") else array
 
 
 def as_identifier(name: str) -> str:

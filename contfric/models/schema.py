@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from contfric.base.yaml_schema import SchemaPart, explained
-from contfric.models.entries import EntryError
+from contfric.models.entries import EntryError, plain
 from contfric.models.reset_modes import FROM, TO, pairs_of
 from contfric.models.schema_values import (
     EMPTY,
@@ -304,7 +304,7 @@ def checked(data: Mapping[str, Any]) -> dict[str, Any]:
     EntryError
         For the first mistake, with the address of its entry.
     """
-    given = _plain(data)
+    given = plain(data)
     schema: type[AnyModel] = StructureFile if COORDINATES in given else WrittenOut
     for key in [key for key, value in given.items() if value is None]:
         if key in schema.model_fields:
@@ -320,12 +320,3 @@ def checked(data: Mapping[str, Any]) -> dict[str, Any]:
     except ValidationError as error:
         raise EntryError(*explained(error, schema, given)) from None
     return found.model_dump(by_alias=True, exclude_none=True)
-
-
-def _plain(value: Any) -> Any:
-    """Return data as a YAML file has them: keys are texts, arrays and tuples are lists, numbers Python's."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(entry) for entry in value]
-    return value.tolist() if hasattr(value, "tolist") else value

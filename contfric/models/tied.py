@@ -74,32 +74,22 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
     """
     from contfric.errors import ModelError
     from contfric.models import load_model
-    from contfric.models.describe import describe, from_text
-    from contfric.models.files import built
-    from contfric.models.grammar import names_in, parse
+    from contfric.models.describe import from_text
+    from contfric.models.files import from_data
 
-    left = [name for name in model.parameter_names if name not in ties]
-    for name, text in ties.items():
+    for name in ties:
         model.index_of(name)
-        try:
-            used = names_in(parse(text)) - {"pi"}
-        except ModelError as error:
-            raise ParameterError(f"{name}: {{tie: {text}}}: {error}") from None
-        for other in sorted(used - set(left)):
-            hint = (
-                "is tied itself" if other in ties else f"is no parameter{did_you_mean(other, left)}"
-            )
-            raise ParameterError(f"{name}: {{tie: {text}}}: '{other}' {hint}")
     source = model if model.definition else load_model(_FORMULAS.get(model.name, model.name))
     if not source.definition:
         raise ParameterError(
             f"model '{model.name}' is not declared by formulas: its parameters cannot be tied"
         )
-    data = from_text(source.definition).data()
+    data, name = from_text(source.definition).data(), _named(model.name, ties)
+    parameters = {**data["parameters"], **{name: {_TIE: text} for name, text in ties.items()}}
     try:
-        return built(describe(_substituted(data, ties) | {"name": _named(model.name, ties)}))
+        return from_data({**data, "name": name, "parameters": parameters})
     except ModelError as error:
-        raise ParameterError(f"{_named(model.name, ties)}: {error}") from None
+        raise ParameterError(f"{name}: {error}") from None
 
 
 def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
@@ -125,10 +115,11 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
         except ModelError as error:
             raise EntryError(("parameters", name), str(error)) from None
         if foreign:
-            hint = did_you_mean(foreign[0], left)
+            other = foreign[0]
+            why = f"is no parameter{did_you_mean(other, left)}"
             raise EntryError(
                 ("parameters", name),
-                f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
+                f"{{tie: {text}}}: '{other}' {'is tied itself' if other in ties else why}",
             )
     return _substituted(data, ties)
 

@@ -567,6 +567,29 @@ def test_what_a_file_has_is_a_matrix_of_real_numbers(
         cf.load_model(file)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_matrix_from_a_file_that_changes_a_little_is_another_one(
+    seed: int, tmp_path: Path
+) -> None:
+    """A model is read once, and anew if any digit of any entry differs, of large matrices too."""
+    rng = np.random.default_rng(seed)
+    size = (2, 5, 35, 40)[seed]
+    stiffness = np.eye(size) + 0.1 / size * np.abs(rng.normal(size=(size, size)))
+    file = tmp_path / "model.yaml"
+    text = FROM_FILE.replace("FILE", "given.npz").replace("[q1, q2]", f"{{q: {size}}}")
+    file.write_text(text)
+    i, j = rng.integers(size, size=2)
+    for step in (0.0, 1e-11, 0.01):
+        stiffness[i, j] += step
+        np.savez(tmp_path / "given.npz", K=stiffness)
+        model = cf.load_model(file)
+        y = np.zeros(2 * size)
+        y[j] = 1.0
+        rates = floats(from_text(model.definition)).field("p", model.defaults, 0.0, list(y))
+        force = float(i == 0) * (1.0 - 0.2)
+        assert rates[size + i] == pytest.approx(force - stiffness[i, j], rel=1e-14, abs=1e-14)
+
+
 def test_sparse_matrices_are_matrices(tmp_path: Path) -> None:
     stiffness = [[2.0, -1.0], [-1.0, 2.0]]
     mmwrite(tmp_path / "K.mtx", csr_matrix(stiffness))
