@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.description import Description
 from contfric.models.entries import EntryError, plain
 from contfric.models.matrices import loaded
 from contfric.models.on_disk import derived
@@ -85,11 +84,6 @@ def _file(path: Path) -> Path:
     raise ModelError(
         f"there is no file {path}{did_you_mean(path.name, sorted(near)) if near else ''}"
     )
-
-
-def built(description: Description) -> Model:
-    """Return the model of a description; the same one for the same description."""
-    return model_of(description.text)
 
 
 @lru_cache(maxsize=64)
