@@ -28,7 +28,7 @@ from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, names_in, parse
-from contfric.models.rewriting import OF_MODES, SHARED, rewritten
+from contfric.models.rewriting import OF_MODES, SHARED, rewritten, tree_of
 
 #: What the clock and its surface are called, and the function that stands for it.
 CLOCK, TICK, MOD = "clock", "tick", "mod"
@@ -105,15 +105,8 @@ def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
     return found
 
 
-def _tree(text: str) -> ast.Expression | None:
-    try:
-        return ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return None  # whoever reads the expression says what is wrong
-
-
 def _ticks(text: str) -> bool:
-    tree = _tree(text) if MOD in text or "%" in text else None
+    tree = tree_of(text) if MOD in text or "%" in text else None
     return tree is not None and any(_is_mod(node) for node in ast.walk(tree))
 
 
@@ -143,12 +136,12 @@ class _Reader(ast.NodeTransformer):
         self.define = {
             name: tree.body
             for name, text in data["define"].items()
-            if (tree := _tree(text)) is not None
+            if (tree := tree_of(text)) is not None
         }
 
     def read(self, text: Any, address: Address) -> Any:
         """Return an expression with the clock in it; a number as it is."""
-        tree, self.address = _tree(text) if isinstance(text, str) else None, address
+        tree, self.address = tree_of(text) if isinstance(text, str) else None, address
         return text if tree is None else ast.unparse(self.visit(tree))
 
     def visit_Call(self, node: ast.Call) -> ast.AST:

@@ -119,11 +119,6 @@ def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) ->
     return force, f"-({times(force, velocity)})"
 
 
-def laws_in(forces: Mapping[str, Any]) -> tuple[ContactLaws, ...]:
-    """Return the laws of the contacts of a model that is written out."""
-    return tuple(ContactLaws(name, **entry) for name, entry in forces.items())
-
-
 def check_laws(laws: tuple[ContactLaws, ...], names: Names, timed: bool) -> None:
     """Look up every name in the laws of contacts."""
     for contact in laws:

@@ -9,7 +9,7 @@ from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.clocks import TICK
-from contfric.models.contact_laws import check_laws, laws_in
+from contfric.models.contact_laws import ContactLaws, check_laws
 from contfric.models.contact_modes import with_contacts
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
@@ -108,7 +108,7 @@ def _described(data: dict[str, Any]) -> Description:
         **data["integration"],
         max_step=data.get("max_step"),
         quantities=tuple(data["quantities"].items()),
-        laws=laws_in(data["forces"]),
+        laws=tuple(ContactLaws(name, **own) for name, own in data["forces"].items()),
         units=tuple(data["in_units"].items()),
         phase=data["phase"],
         structure=data.get("structure", {}),
@@ -160,8 +160,8 @@ def _modes(
     found = []
     for name, entry in data["modes"].items():
         address = ("modes", name)
-        sides, sliding, rank = entry["in"], entry.get("sliding"), entry.get("rank")
-        known_sides(sides, known, (*address, "in"))
+        sides = known_sides(entry["in"], known, (*address, "in"))
+        sliding, rank = entry.get("sliding"), entry.get("rank")
         if sliding is not None and sliding != (0 in sides.values()):
             raise EntryError(
                 (*address, "sliding"),
@@ -197,26 +197,32 @@ def _modes(
 def _domains(
     data: Mapping[str, Any], modes: tuple[ModeText, ...], known: list[str]
 ) -> tuple[DomainText, ...]:
-    for name, entry in data["domains"].items():
-        one_of(entry["mode"], [m.name for m in modes], "mode", ("domains", name, "mode"))
-        known_sides(entry["in"], known, ("domains", name, "in"))
+    names = [m.name for m in modes]
     return tuple(
-        DomainText(name, entry["mode"], entry["in"], entry["label"])
+        DomainText(
+            name,
+            one_of(entry["mode"], names, "mode", ("domains", name, "mode")),
+            known_sides(entry["in"], known, ("domains", name, "in")),
+            entry["label"],
+        )
         for name, entry in data["domains"].items()
     )
 
 
 def _departures(data: Mapping[str, Any], known: list[str]) -> tuple[Departure, ...]:
+    found = []
     for index, entry in enumerate(data["departures"]):
-        leaves = entry["leaves"]
-        known_sides(leaves, known, ("departures", index, "leaves"))
+        where, leaves = (
+            known_sides(entry[key], known, ("departures", index, key))
+            for key in ("where", "leaves")
+        )
         if not leaves or 0 in leaves.values():
             raise EntryError(
                 ("departures", index, "leaves"),
                 "'leaves' names a surface and the side, + or -, it is left to",
             )
-        known_sides(entry["where"], known, ("departures", index, "where"))
-    return tuple(Departure(entry["where"], entry["leaves"]) for entry in data["departures"])
+        found.append(Departure(where, leaves))
+    return tuple(found)
 
 
 def _resets(

@@ -59,10 +59,11 @@ def known_keys(keys: Iterable[str], valid: Iterable[str], address: Address) -> N
             raise EntryError((*address, key), f"unknown key '{key}'{did_you_mean(key, names)}")
 
 
-def known_sides(sides: Iterable[str], surfaces: Iterable[str], address: Address) -> None:
-    """Refuse sides of what is no surface."""
+def known_sides(sides: dict[str, int], surfaces: Iterable[str], address: Address) -> dict[str, int]:
+    """Return the sides of surfaces, and refuse those of what is none."""
     names = tuple(surfaces)
     for surface in sides:
         if surface not in names:
             hint = did_you_mean(surface, names)
             raise EntryError((*address, surface), f"no surface '{surface}'{hint}")
+    return sides

@@ -26,9 +26,8 @@ def leads_of(
             one_of(mode, modes, "mode", (*address, TO))
             place = (*address, TO, mode)
             sides = {surface: side for surface, side in asked.items() if surface != FROM}
-            known_sides(sides, surfaces, place)
             after = acts_of(asked, modes, place) if FROM in asked else ()
-            found.append(Lead(mode, sides, after))
+            found.append(Lead(mode, known_sides(sides, surfaces, place), after))
     return tuple(found)
 
 

@@ -16,7 +16,7 @@ from contfric.models.contacts import Contact, ContactKind, drift, factor_of, rea
 from contfric.models.entries import EntryError, known_keys
 from contfric.models.matrices import Mass, Texts, folded, is_zero, mass_of, matrix_of, summed, times
 from contfric.models.shared_loads import Setting, SharedLoads
-from contfric.models.structure_names import check_known, check_names, check_states
+from contfric.models.structure_names import check_known, check_states
 
 #: Most combinations of states of contacts that are listed, each a mode with regions of its own.
 _MOST_MODES = 243
@@ -67,8 +67,12 @@ class Structure:
             raise EntryError(("contacts",), "a structure has at least one contact")
         known = {*coordinates, *velocities, "t", "pi", *data["contacts"]}
         known |= {*data["define"], *data["observables"], *data["parameters"]}
-        for key in ("damping", "stiffness", "force"):
-            check_names(data, key, size, known)
+        for key, rows in ("damping", damping), ("stiffness", stiffness):
+            for row, texts in enumerate(rows):
+                for text in texts:
+                    check_known((key, row), text, known)
+        for name, text in data["force"].items():
+            check_known(("force", name), text, known)
         known |= {"T", *(f"f_{q}" for q in coordinates)}
         for contact in contacts:
             for key, text in contact.texts.items():

@@ -8,7 +8,6 @@ from typing import Any
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError
 from contfric.models.grammar import check_name, names_in, parse
-from contfric.models.matrices import matrix_of
 
 COORDINATES = "coordinates"
 
@@ -33,17 +32,6 @@ def check_states(
             raise EntryError(
                 ("contacts", name), f"the stretch of '{name}' has the name of a {taken[name]}"
             )
-
-
-def check_names(data: Mapping[str, Any], key: str, size: int, known: set[str]) -> None:
-    """Look up the names in a matrix or in the forces, each in its row."""
-    if key == "force":
-        for name, text in data[key].items():
-            check_known((key, name), text, known)
-        return
-    for row, texts in enumerate(matrix_of(key, data[key], size)):
-        for text in texts:
-            check_known((key, row), text, known)
 
 
 def check_known(address: tuple[str | int, ...], text: str, known: set[str]) -> None:

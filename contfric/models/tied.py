@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.rewriting import OF_MODES, OTHERS, SHARED, rewritten, tree_of
 
 if TYPE_CHECKING:
     from contfric.models import ModelSource
@@ -130,8 +131,6 @@ def _named(name: str, ties: Mapping[str, str]) -> str:
 
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:
     """Return a model's data with expressions in the place of parameters."""
-    from contfric.models.rewriting import OF_MODES, OTHERS, SHARED, rewritten
-
     put = Substitution(ties)
     found = rewritten(data, (*SHARED, *OF_MODES, *OTHERS), lambda text, _: put.text(text))
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
@@ -153,11 +152,8 @@ class Substitution(ast.NodeTransformer):
 
     def text(self, text: str) -> str:
         """Return an expression with the ties put in."""
-        try:
-            tree = ast.parse(str(text).strip(), mode="eval")
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            return text  # whoever reads it says what is wrong
-        return ast.unparse(self.visit(tree))
+        tree = tree_of(str(text))
+        return text if tree is None else ast.unparse(self.visit(tree))
 
     def condition(self, text: str) -> str:
         """Return an inequality with the ties put in, as it stood if none is in it."""
