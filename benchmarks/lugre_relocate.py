@@ -20,7 +20,7 @@ import numpy as np
 
 import contfric as cf
 from contfric.models.describe import from_text
-from contfric.models.files import built
+from contfric.models.files import model_of
 from contfric.orbit.solve import refine
 from contfric.orbit.system import build_system
 
@@ -45,7 +45,7 @@ class Place:
 
 def with_tolerance(model: cf.Model, tolerance: float) -> cf.Model:
     """Return a declared model that is integrated to another tolerance."""
-    return built(replace(from_text(model.definition), tolerance=tolerance))
+    return model_of(replace(from_text(model.definition), tolerance=tolerance).text)
 
 
 def moved_cut(orbit: cf.Orbit, model: cf.Model, phase: float) -> cf.Orbit:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import reprlib
 from collections.abc import Mapping
 from enum import Enum
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -25,7 +25,8 @@ class SchemaPart(BaseModel):
     """A mapping of a YAML file: no other keys than its own, and no types but these.
 
     The description of a field is what its value must be: messages say "'key' must be {description}".
-    ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key.
+    ``json_schema_extra`` may have "entry": what is said of one entry of a mapping, with {} for its key, and
+    "item": what is said of one of a list.
     """
 
     model_config = ConfigDict(
@@ -67,6 +68,9 @@ def _said(limits: str, what: str) -> str:
 
 #: What pydantic calls a key that a part does not have; the second is no text.
 _UNKNOWN = ("extra_forbidden", "invalid_key")
+#: What it calls a part whose kind is none, and something else in the place of a mapping.
+_NO_KIND = ("union_tag_invalid", "union_tag_not_found")
+_NO_MAPPING = ("dict_type", "model_type", "model_attributes_type")
 
 _Schema = TypeVar("_Schema", bound=BaseModel)
 
@@ -82,8 +86,14 @@ def validated(located: LocatedYaml, schema: type[_Schema], data: Any = None) -> 
     try:
         return schema.model_validate(given)
     except ValidationError as error:
-        entry = _cause(error, given)
-        located.fail(_place(given, entry["loc"]), _message(entry, schema, given))
+        located.fail(*explained(error, schema, given))
+
+
+def explained(error: ValidationError, schema: type[BaseModel], data: Any) -> tuple[Address, str]:
+    """Return the place of the first mistake in data, and what is wrong with it and what would be valid."""
+    entry = _cause(error, data)
+    own = entry["ctx"]["discriminator"].strip("'") if entry["type"] in _NO_KIND else ""
+    return _place(data, (*entry["loc"], own)), _message(entry, schema, data)
 
 
 def keys_of(schema: type[BaseModel]) -> str:
@@ -147,17 +157,31 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
         hint = comma_hint(unknown, given) or _belongs(unknown, part)
         hint = hint or did_you_mean(unknown, _fields(part))
         return f"unknown key '{unknown}'{hint}"
+    if entry["type"] in _NO_KIND and info is not None:
+        own, tag = entry["ctx"]["discriminator"], entry["ctx"].get("tag")
+        names = [v for kind in _kinds(info.annotation, BaseModel) for v in _tags(kind)[1:]]
+        if tag is None:
+            return f"key {own} is missing; it must be {', '.join(names[:-1])} or {names[-1]}"
+        return f"{own} has no '{tag}'{did_you_mean(tag, names)}"
     wanted = info.description if info else "as the guide says"
     if entry["type"] == "missing":
         return f"key '{key}' is missing; it must be {wanted}"
-    if entry["type"] == "enum" and info is not None:
-        names = [str(member.value) for kind in _kinds(info.annotation, Enum) for member in kind]
+    if entry["type"] in ("enum", "literal_error") and info is not None:
+        names = _values(info.annotation)
         return f"'{key}' has no '{given}'{did_you_mean(str(given), names)}"
-    last = next((k for k in reversed(_place(data, address)) if isinstance(k, str)), key)
+    place = _place(data, address)
+    last = next((step for step in reversed(place) if isinstance(step, str)), key)
     extra = info.json_schema_extra if info else None
-    if last != key and isinstance(extra, dict) and "entry" in extra:
-        return f"{str(extra['entry']).format(last)}, got {_given(given)}"
-    return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{_given(given)}"
+    said: dict[str, Any] = extra if isinstance(extra, dict) else {}
+    got = _given(given)
+    if last != key:
+        near = did_you_mean(last, _fields(part)) if part.model_config["extra"] == "allow" else ""
+        got += comma_hint(last, given) or (near if near.startswith(";") else "")
+    if "item" in said and last != place[-1] and entry["type"] != "list_type":
+        return f"{said['item'].format(key)}, got {got}"
+    if "entry" in said and last != key and entry["type"] not in _NO_MAPPING:
+        return f"{said['entry'].format(last)}, got {got}"
+    return f"'{key}' must be {wanted}, got {'' if last == key else f'{last}: '}{got}"
 
 
 def _belongs(unknown: str, part: type[BaseModel]) -> str:
@@ -173,6 +197,8 @@ def _belongs(unknown: str, part: type[BaseModel]) -> str:
 
 def _given(value: object) -> str:
     """Return a value and, where YAML may surprise, why it is what it is."""
+    if value is None:
+        return "nothing"
     try:
         text = f"{reprlib.repr(value)} ({type(value).__name__})"
     except ValueError:  # a number of more digits than Python writes
@@ -195,6 +221,7 @@ def _described(
 ) -> tuple[type[BaseModel], str, FieldInfo | None]:
     """Return the innermost part that an address leads through, its last known key, and the field."""
     part, key, info = schema, str(address[0]) if address else "", None
+    below: list[type[BaseModel]] = []
     for step in address:
         found = _fields(part).get(str(step))
         if found is not None:
@@ -203,7 +230,22 @@ def _described(
             if not below:
                 break
             part = below[0]
+        else:  # of parts that are told apart, the one that was tried has its name in the address
+            part = next((kind for kind in below if step in _tags(kind)), part)
     return part, key, info
+
+
+def _tags(kind: type[BaseModel]) -> list[str]:
+    """Return by which names a part is told from others: that of its class, or a value that it must have."""
+    return [kind.__name__, *(v for f in kind.model_fields.values() for v in _values(f.annotation))]
+
+
+def _values(annotation: Any) -> list[str]:
+    """Return the names that an annotation lists."""
+    if get_origin(annotation) is Literal:
+        return [str(value) for value in get_args(annotation)]
+    members = [str(member.value) for kind in _kinds(annotation, Enum) for member in kind]
+    return members or [name for part in get_args(annotation) for name in _values(part)]
 
 
 _Kind = TypeVar("_Kind")

@@ -17,7 +17,7 @@ from contextlib import suppress
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, TIME, Scope, parse
 
 #: The key of a model.
@@ -44,14 +44,13 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
     EntryError
         If an angle is no state, or a surface has the name of one of its own.
     """
-    part = Part(data)
-    angles, states = part.texts(ANGLES), [str(s) for s in data.get("states") or ()]
+    angles, states = data["angles"], data["states"]
     for index, angle in enumerate(angles):
         if angle not in states:
             raise EntryError(
                 (ANGLES, index), f"'{angle}' is no state: an angle is one of {', '.join(states)}"
             )
-    surfaces, resets = mapping_in(data, "surfaces"), mapping_in(data, "resets")
+    surfaces, resets = dict(data["surfaces"]), dict(data["resets"])
     wanted = {s: angle for angle in angles for s in wraps_of(angle)}
     if not wanted or all(name in resets for name in wanted):  # a model that was stored has them
         return data
@@ -67,12 +66,7 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
         sides[name] = side
         surfaces[name] = {"observable": angle, "level": cuts[angle][side < 0]}
         resets[name] = {angle: f"{angle} {'-' if side < 0 else '+'} 2*pi"}
-    modes = {
-        name: {**mode, "in": {**mapping_in(mode, "in"), **sides}}
-        if isinstance(mode, Mapping)
-        else mode
-        for name, mode in mapping_in(data, "modes").items()
-    }
+    modes = {name: {**m, "in": {**m["in"], **sides}} for name, m in data["modes"].items()}
     return {**data, "surfaces": surfaces, "resets": resets, "modes": modes}
 
 
@@ -87,10 +81,7 @@ def _cut(data: Mapping[str, Any], angle: str) -> tuple[str, str]:
     EntryError
         If such a surface is met nowhere: it names a place that the angle never comes to.
     """
-    heights = {
-        str(name): _heights(data, angle, entry)
-        for name, entry in mapping_in(data, "surfaces").items()
-    }
+    heights = {name: _heights(data, angle, entry) for name, entry in data["surfaces"].items()}
     once = {name: height for name, height in heights.items() if _is_met_once(height)}
     missed: dict[tuple[str, str], list[str]] = {}
     for cut in _CUTS:
@@ -114,25 +105,20 @@ Heights = Callable[[float], list[float]]
 
 def _heights(data: Mapping[str, Any], angle: str, surface: Mapping[str, Any]) -> Heights:
     """Return the function of an angle that the height of a surface is."""
-    values: dict[str, Any] = {
-        name: value.get("default") if isinstance(value, Mapping) else value
-        for name, value in mapping_in(data, "parameters").items()
-    }
-    texts = {**mapping_in(data, "define"), **mapping_in(data, "observables")}
+    values: dict[str, float] = {n: entry["default"] for n, entry in data["parameters"].items()}
+    texts = {**data["define"], **data["observables"]}
 
     def heights(at: float) -> list[float]:
         draw, found = random.Random(1), []
         for _ in range(_STATES):
-            y = {name: draw.uniform(-1.0, 1.0) for name in (*map(str, data["states"]), TIME)}
+            y = {name: draw.uniform(-1.0, 1.0) for name in (*data["states"], TIME)}
             found.append(math.nan)
             with suppress(
                 ModelError, ArithmeticError, TypeError, ValueError
             ):  # its reader says why
-                named = {
-                    name: parse(str(text)) for name, text in texts.items() if str(text) != name
-                }
+                named = {name: parse(text) for name, text in texts.items() if text != name}
                 scope = Scope[float](FLOATS, {**values, **y, angle: at}, named)
-                observable, level = (parse(str(surface.get(k, 0))) for k in ("observable", "level"))
+                observable, level = (parse(surface[k]) for k in ("observable", "level"))
                 found[-1] = float(scope.evaluate(observable) - scope.evaluate(level))
         return found
 

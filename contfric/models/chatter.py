@@ -60,9 +60,7 @@ def chatter_parts(
         If a reset is no impact of one mode.
     """
     formulas = Formulas(description)
-    found: dict[str, Any] = {
-        key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
-    }
+    found: dict[str, Any] = {k: dict(data[k]) for k in ("observables", "surfaces", "modes")}
     chatters = {}
     for surface in surfaces:
         name = CHATTER if len(surfaces) == 1 else f"{CHATTER}_{surface}"

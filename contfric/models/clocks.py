@@ -26,9 +26,9 @@ import numpy as np
 
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
-from contfric.models.entries import EntryError, mapping_in
+from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, names_in, parse
-from contfric.models.rewriting import OF_MODES, SHARED, rewritten
+from contfric.models.rewriting import OF_MODES, SHARED, rewritten, tree_of
 
 #: What the clock and its surface are called, and the function that stands for it.
 CLOCK, TICK, MOD = "clock", "tick", "mod"
@@ -55,45 +55,42 @@ def with_clock(data: dict[str, Any]) -> dict[str, Any]:
     EntryError
         Where ``mod`` is not that of the time and the model's period, or a name is taken.
     """
-    latched = TICK in mapping_in(data, "resets") and TICK not in mapping_in(data, "surfaces")
+    latched = TICK in data["resets"] and TICK not in data["surfaces"]
     if not latched and not any(_ticks(text) for _, text in _expressions(data)):
         return data
     period = data.get("period")
-    if not isinstance(period, (str, int, float)) or isinstance(period, bool):
+    if period is None:
         raise EntryError((), f"{MOD}(t, T) needs the period T of the model: write 'period: ...'")
     _check_names(data)
-    reader = _Reader(str(period), data)
+    reader = _Reader(period, data)
     values = {name: reader.value(ast.Name(name, ast.Load())) for name in reader.parameters}
     timed = [pair for pair in _expressions(data) if pair[0][0] != "define"]
-    define = {str(name): str(text) for name, text in mapping_in(data, "define").items()}
-    every = value_at_defaults(str(period), data)
-    check_time(timed, define, values, every, _is_mod)
+    every = value_at_defaults(period, data)
+    check_time(timed, data["define"], values, every, _is_mod)
     found = rewritten(rewritten(data, SHARED, reader.read), OF_MODES, reader.read)
     ahead = reader.ahead
     rates = {CLOCK: 1, **dict.fromkeys(ahead.values(), 1)}
     ticks = {TICK: CLOCK, **{clock.replace(CLOCK, TICK): clock for clock in ahead.values()}}
-    found["modes"] = {
-        name: _mode(mode, rates, ticks) for name, mode in mapping_in(found, "modes").items()
-    }
+    found["modes"] = {name: _mode(mode, rates, ticks) for name, mode in found["modes"].items()}
     if "field" in data:
         found["field"] = {**found["field"], **rates}
     del found["period"]
     begins = {CLOCK: 0, **{clock: text for text, clock in ahead.items()}}
-    resets = mapping_in(found, "resets")
+    resets = found["resets"]
     return found | {
         "autonomous": True,
-        "states": [*data.get("states", ()), *rates],
+        "states": [*data["states"], *rates],
         "surfaces": {
-            **mapping_in(data, "surfaces"),
-            **{tick: {"observable": clock, "level": str(period)} for tick, clock in ticks.items()},
+            **data["surfaces"],
+            **{tick: {"observable": clock, "level": period} for tick, clock in ticks.items()},
         },
         "resets": {
             **resets,
             **{tick: {clock: 0, **resets.get(tick, {})} for tick, clock in ticks.items()},
             TICK: {**begins, **resets.get(TICK, {})},
         },
-        "symmetry": _symmetry(data),
-        "spread": {**mapping_in(data, "spread"), **dict.fromkeys(rates, f"({period})/2")},
+        **_symmetry(data),
+        "spread": {**data["spread"], **dict.fromkeys(rates, f"({period})/2")},
     }
 
 
@@ -108,15 +105,8 @@ def _expressions(data: Mapping[str, Any]) -> list[tuple[Address, str]]:
     return found
 
 
-def _tree(text: str) -> ast.Expression | None:
-    try:
-        return ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return None  # whoever reads the expression says what is wrong
-
-
 def _ticks(text: str) -> bool:
-    tree = _tree(text) if MOD in text or "%" in text else None
+    tree = tree_of(text) if MOD in text or "%" in text else None
     return tree is not None and any(_is_mod(node) for node in ast.walk(tree))
 
 
@@ -126,9 +116,8 @@ def _is_mod(node: ast.AST) -> bool:
 
 
 def _check_names(data: Mapping[str, Any]) -> None:
-    taken = {*map(str, data.get("states", ())), *mapping_in(data, "parameters")}
-    taken |= {*mapping_in(data, "define"), *mapping_in(data, "observables")}
-    if any(map(is_clock, taken)) or TICK in mapping_in(data, "surfaces"):
+    taken = {*data["states"], *data["parameters"], *data["define"], *data["observables"]}
+    if any(map(is_clock, taken)) or TICK in data["surfaces"]:
         raise EntryError(
             (),
             f"a model with {MOD}(t, T) gets a state '{CLOCK}' and a surface '{TICK}': "
@@ -142,20 +131,17 @@ class _Reader(ast.NodeTransformer):
     def __init__(self, period: str, data: Mapping[str, Any]) -> None:
         self.period = period
         self.address: Address = ()
-        self.parameters = {
-            str(name): value.get("default") if isinstance(value, Mapping) else value
-            for name, value in mapping_in(data, "parameters").items()
-        }
+        self.parameters = {n: entry["default"] for n, entry in data["parameters"].items()}
         self.ahead: dict[str, str] = {}  # how far other clocks are ahead, and their names
         self.define = {
             name: tree.body
-            for name, text in mapping_in(data, "define").items()
-            if (tree := _tree(str(text))) is not None
+            for name, text in data["define"].items()
+            if (tree := tree_of(text)) is not None
         }
 
     def read(self, text: Any, address: Address) -> Any:
         """Return an expression with the clock in it; a number as it is."""
-        tree, self.address = _tree(text) if isinstance(text, str) else None, address
+        tree, self.address = tree_of(text) if isinstance(text, str) else None, address
         return text if tree is None else ast.unparse(self.visit(tree))
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -213,11 +199,11 @@ class _Reader(ast.NodeTransformer):
     def value(self, node: ast.expr, k: int = 0) -> float:
         """Return the value of an expression of the parameters at the defaults, or moved a little."""
         moved = {
-            name: float(v) * (1.0 + _MOVED[k] * (1 + i * k)) if isinstance(v, (int, float)) else 0.0
+            name: v * (1.0 + _MOVED[k] * (1 + i * k))
             for i, (name, v) in enumerate(self.parameters.items())
         }
         try:
-            return Scope(FLOATS, moved, self.define).evaluate(node)
+            return float(Scope(FLOATS, moved, self.define).evaluate(node))
         except ModelError as error:
             raise EntryError(self.address, str(error)) from None
 
@@ -231,8 +217,8 @@ class _Reader(ast.NodeTransformer):
 
 def value_at_defaults(text: str, data: Mapping[str, Any]) -> float:
     """Return the value of an expression of parameters and definitions, at the defaults of a model."""
-    reader = _Reader(str(data.get("period") or 1), data)
-    return float(reader.value(reader.visit(ast.parse(text.strip(), mode="eval")).body))
+    reader = _Reader(data.get("period", "1"), data)
+    return reader.value(reader.visit(ast.parse(text.strip(), mode="eval")).body)
 
 
 def _shift_of(time: ast.expr) -> ast.expr | None:
@@ -258,30 +244,20 @@ def _is_time(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and node.id == TIME
 
 
-def _mode(mode: Any, rates: Mapping[str, int], ticks: Iterable[str]) -> Any:
-    if not isinstance(mode, Mapping):
-        return mode
-    found = {**mode, "in": {**mapping_in(mode, "in"), **dict.fromkeys(ticks, "-")}}
-    field = mode.get("field")
-    return {**found, "field": {**field, **rates}} if isinstance(field, Mapping) else found
+def _mode(mode: Mapping[str, Any], rates: Mapping[str, int], ticks: Iterable[str]) -> Any:
+    found = {**mode, "in": {**mode["in"], **dict.fromkeys(ticks, "-")}}
+    return {**found, "field": {**mode["field"], **rates}} if "field" in mode else found
 
 
-def _symmetry(data: Mapping[str, Any]) -> Any:
-    symmetry = data.get("symmetry")
-    if symmetry is None:
-        return None
-    pieces = symmetry.split(",") if isinstance(symmetry, str) else []
-    images = dict(symmetry) if isinstance(symmetry, Mapping) else {}
-    for piece in pieces:
-        name, _, image = piece.partition("->")
-        images[name.strip()] = image.strip()
-    if str(images.pop(TIME, TIME)).strip() != TIME:
+def _symmetry(data: Mapping[str, Any]) -> dict[str, Any]:
+    images = dict(data.get("symmetry", {}))
+    if images.pop(TIME, TIME) != TIME:
         raise EntryError(
             ("symmetry",),
             f"a model with {MOD}(t, T) has a symmetry of its states only: half a period later the clock "
             "shows another time",
         )
-    return images
+    return {"symmetry": images} if images else {}
 
 
 def check_time(

@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from contfric.models.contacts import Contact, ContactKind, is_at_rest
-from contfric.models.entries import Part
 from contfric.models.matrices import summed, times
 
 if TYPE_CHECKING:
@@ -118,22 +117,6 @@ def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) ->
     friction = contact.kind is ContactKind.FRICTION
     velocity = contact.texts["velocity"] if friction else structure.speed(contact)
     return force, f"-({times(force, velocity)})"
-
-
-def read_laws(top: Part) -> tuple[ContactLaws, ...]:
-    """Return the laws of the contacts of a model that is written out."""
-    part = top.part(KEY, "a mapping of contacts to {modes: ..., texts: ...}")
-    found = []
-    for name in part.data:
-        entry = part.part(name, "{modes: ..., texts: ...}")
-        entry.only(("modes", "texts", *_POSITION))
-        modes, texts = (
-            {k: str(v) for k, v in entry.part(key, "a mapping of texts").data.items()}
-            for key in ("modes", "texts")
-        )
-        position = {key: str(entry.data[key]) for key in _POSITION if key in entry.data}
-        found.append(ContactLaws(name, modes, texts, **position))
-    return tuple(found)
 
 
 def check_laws(laws: tuple[ContactLaws, ...], names: Names, timed: bool) -> None:

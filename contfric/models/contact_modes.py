@@ -12,7 +12,7 @@ import itertools
 import math
 import random
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
@@ -22,24 +22,18 @@ from contfric.models.contact_ranges import constraints_of
 from contfric.models.contact_surfaces import ContactSurfaces, subsets
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.description import STRUCTURE
-from contfric.models.entries import EntryError, Part, constraints_in, mapping_in
+from contfric.models.entries import known_keys
 from contfric.models.grammar import FLOATS, TIME, Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
 from contfric.models.shared_loads import Limit, Setting, load_name
 from contfric.models.structure import Structure, defaults_of
 from contfric.models.structure_names import COORDINATES
-from contfric.models.units import read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
-KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
+_OWN = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
 #: What a structure is not made from: it stands in the model itself.
 _APART = ("title", "references", "symmetry", "spread", "quantities", "max_step", "integration")
-_OTHERS = (
-    *("name", "title", "references", "parameters", "constraints", "period", "autonomous", "define"),
-    *("observables", "symmetry", "spread", "units", "integration", "max_step", "quantities"),
-)
-_T = TypeVar("_T")
 #: How far the order of a harmonic may be from an odd number: rounding.
 _ODD = 1e-9
 #: What limits the force of a contact, and how many states tell whether it is an even function of them.
@@ -47,23 +41,14 @@ _LIMITS, _TRIES = ("kinetic", "static", "limit"), 5
 
 
 def with_contacts(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a model's data with its structure and contacts written out; unchanged where it has none.
+    """Return the model of a structure with its contacts written out.
 
     Raises
     ------
     EntryError
         For the first mistake, with the address of its entry.
     """
-    if COORDINATES not in data:
-        for key in KEYS[1:]:
-            if key in data and "states" not in data:
-                raise EntryError(
-                    (key,), f"'{key}' needs '{COORDINATES}': write {COORDINATES}: [q1, q2]"
-                )
-        return data
-    top = Part(data)
-    top.only((*KEYS, *_OTHERS))
-    structure = Structure.read(top)
+    structure = Structure.read(data)
     composes = structure.composes
     if not composes:
         structure.check_count()
@@ -79,7 +64,7 @@ class Combinations:
     """The parts of a model that a structure with contacts is."""
 
     def __init__(self, structure: Structure) -> None:
-        self.structure, self.top = structure, structure.top
+        self.structure, self._data = structure, structure.data
         self.coordinates, self.velocities = structure.coordinates, structure.velocities
         self.contacts, self.mass = structure.contacts, structure.mass
         self.surfaces = ContactSurfaces(structure)
@@ -92,30 +77,26 @@ class Combinations:
         ----------
         only_quiet : only the mode in which no contact acts: others come when they are visited
         """
-        kept = {key: value for key, value in self.top.data.items() if key not in KEYS}
+        kept = {key: value for key, value in self._data.items() if key not in _OWN}
         stretches = [c.name for c in self.contacts if c.kind is ContactKind.JENKINS]
         states = [*self.coordinates, *self.velocities, *stretches]
-        define = {**mapping_in(kept, "define")}
-        define |= {
-            f"f_{q}": force
-            for q, force in zip(self.coordinates, self.structure.forces, strict=True)
-        }
+        forces = zip(self.coordinates, self.structure.forces, strict=True)
+        define = {**kept["define"], **{f"f_{q}": force for q, force in forces}}
         observables, surfaces = self.surfaces.listed()
         modes = self._quiet() if only_quiet else self._modes()
         found = {
             **kept,
             "states": states,
             "define": define,
-            "observables": {**mapping_in(kept, "observables"), **observables},
+            "observables": {**kept["observables"], **observables},
             "surfaces": surfaces,
             "modes": modes,
             "forces": laws_of(self.structure, self.states),
             "departures": [] if only_quiet else departures_of(self.surfaces),
-            "spread": mapping_in(kept, "spread"),
         }
-        found |= {"units": self._units(stretches)} if "units" in kept else {}
-        if ranges := dict(constraints_of(self.contacts, defaults_of(self.top))):
-            found["constraints"] = ranges | constraints_in(kept)
+        found |= {"units": self._units(stretches)} if kept["units"] else {}
+        if ranges := dict(constraints_of(self.contacts, defaults_of(self._data))):
+            found["constraints"] = ranges | kept["constraints"]
         resets = resets_of(self.structure)
         found |= {"resets": resets} if resets else {}
         if "symmetry" not in kept and self._is_symmetric():
@@ -127,25 +108,25 @@ class Combinations:
 
     def _units(self, stretches: Sequence[str]) -> dict[str, Any]:
         """Return the units that are given, and what follows for velocities and stretches."""
-        given = mapping_in(self.top.data, "units")
-        numbers = read_units(self.top, "units", (*self.coordinates, *self.velocities, *stretches))
-        time, lengths = numbers.get("t", 1.0), [numbers.get(q, 1.0) for q in self.coordinates]
+        given = self._data["units"]
+        known_keys(given, (*self.coordinates, *self.velocities, *stretches, TIME), ("units",))
+        time, lengths = given.get(TIME, 1.0), [given.get(q, 1.0) for q in self.coordinates]
         found: dict[str, Any] = {v: q / time for v, q in zip(self.velocities, lengths, strict=True)}
         return {**found, **dict.fromkeys(stretches, max(lengths)), **given}
 
     def _is_symmetric(self) -> bool:
         """Tell whether the motion of the opposite states half a period later is one, too, at the defaults."""
-        params = defaults_of(self.top)
+        params = defaults_of(self._data)
         if any(c.kind in (ContactKind.SPRING, ContactKind.IMPACT) for c in self.contacts):
             return False
         scope = Scope(AFFINE, symbols(self._moving, tuple(params)), self._define)
-        period = self.top.data.get("period")
+        period = self._data.get("period")
         try:
             forms = [
                 *(scope.evaluate(parse(f)) for f in self.structure.forces),
                 *(c.form for c in self.contacts),
             ]
-            turn = number_of(str(period), params) / math.tau if period else math.nan
+            turn = number_of(period, params) / math.tau if period else math.nan
             waves = [key[1] for form in forms for key in form.parts if key[0] != "y"]
             orders = [number_of(text_of(w), params) * turn if w else 0.0 for w in waves]
         except (NotAffineError, ModelError):
@@ -159,7 +140,7 @@ class Combinations:
 
     @property
     def _define(self) -> dict[str, ast.expr]:
-        return {k: parse(str(v)) for k, v in mapping_in(self.top.data, "define").items()}
+        return {k: parse(text) for k, text in self._data["define"].items()}
 
     def _limits_are_even(self, params: Mapping[str, float]) -> bool:
         """Tell whether limits of friction are those of the opposite states half a period later.
@@ -168,8 +149,8 @@ class Combinations:
         coordinate, or the excitation, is another one there.
         """
         texts = {c.texts[key] for c in self.contacts for key in _LIMITS if key in c.texts}
-        period = self.top.data.get("period")
-        span, draw = number_of(str(period), params) if period else 0.0, random.Random(2)
+        period = self._data.get("period")
+        span, draw = number_of(period, params) if period else 0.0, random.Random(2)
         define = self._define
         for _ in range(_TRIES):
             t, at = span * draw.random(), {name: draw.gauss(0.0, 1.0) for name in self._moving}

@@ -87,7 +87,7 @@ class ContactSurfaces:
     def is_fixed(self, c: Contact) -> bool:
         """Tell whether the static limit of a contact depends on parameters only."""
         static = c.texts.get("static", c.texts["kinetic"])
-        return names_in(parse(static)) <= {*defaults_of(self.structure.top), "pi"}
+        return names_in(parse(static)) <= {*defaults_of(self.structure.data), "pi"}
 
     def stop_of(self, c: Contact) -> tuple[str, Mapping[str, str]]:
         """Return the surface on which the velocity of an element vanishes, and its sides where it slides.
@@ -103,7 +103,7 @@ class ContactSurfaces:
     @cached_property
     def section(self) -> str:
         """The surface of the velocity by which an orbit is found along which no contact changes; or none."""
-        if "period" not in self.structure.top.data:  # where nothing acts nothing moves
+        if "period" not in self.structure.data:  # where nothing acts nothing moves
             return ""
         elastic = [c for c in self.contacts if c.kind is ContactKind.JENKINS]
         gaps = [c for c in self.contacts if c.kind is ContactKind.SPRING]

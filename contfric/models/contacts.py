@@ -25,11 +25,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Any
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.coefficient_texts import text_of
 from contfric.models.coefficients import AFFINE, CONSTANT, Affine, symbols
-from contfric.models.entries import Part
+from contfric.models.entries import EntryError
 from contfric.models.grammar import Scope, check_name, parse
 from contfric.models.not_affine import NotAffineError
 
@@ -43,19 +45,8 @@ class ContactKind(str, Enum):
     IMPACT = "impact"
 
 
-#: What a contact of each kind is declared by; the last ones may be left out.
-KEYS = {
-    ContactKind.FRICTION: ("velocity", "kinetic", "static"),
-    ContactKind.JENKINS: ("displacement", "stiffness", "limit"),
-    ContactKind.SPRING: ("gap", "stiffness"),
-    ContactKind.IMPACT: ("gap", "restitution"),
-}
-_OPTIONAL = ("static",)
-#: Where a contact rests that never slips, if the motion is not to decide.
-_AT = "at"
-_POSITIONED = dict.fromkeys((ContactKind.FRICTION, ContactKind.JENKINS), (_AT,))
-#: What an impact may say: that it comes to rest after infinitely many impacts.
-_CHATTER = "chatter"
+#: Keys of a contact that are not expressions of what it carries: where it rests, and whether it chatters.
+_AT, _CHATTER = "at", "chatter"
 #: What the direction of each kind is the gradient of.
 _DIRECTION = {
     ContactKind.FRICTION: "velocity",
@@ -103,11 +94,10 @@ class Contact:
 
 
 def read_contacts(
-    part: Part,
+    data: Mapping[str, Any],
     coordinates: tuple[str, ...],
     velocities: tuple[str, ...],
     parameters: tuple[str, ...],
-    define: Mapping[str, str],
 ) -> list[Contact]:
     """Read the contacts of a structure.
 
@@ -116,52 +106,46 @@ def read_contacts(
     EntryError
         For the first mistake.
     """
-    own = tuple(n for n in part.data if _is_jenkins(part.data[n]))
+    given = data["contacts"]
+    own = tuple(n for n, entry in given.items() if entry["kind"] == ContactKind.JENKINS.value)
     scope = Scope(
         AFFINE,
         symbols((*coordinates, *velocities, *own), parameters),
-        {name: parse(text) for name, text in define.items()},
+        {name: parse(text) for name, text in data["define"].items()},
     )
     found = []
-    for name in part.data:
-        entry = part.part(name, "{kind: friction, velocity: v1, kinetic: S, static: S0}")
+    for name, entry in given.items():
+        address = ("contacts", name)
         try:
             check_name(name, "contact")
         except ModelError as error:
-            part.fail(name, str(error))
+            raise EntryError(address, str(error)) from None
         if name in (*coordinates, *velocities, *parameters):
-            part.fail(
-                name,
+            raise EntryError(
+                address,
                 f"'{name}' is a coordinate, velocity or parameter: give the contact another name",
             )
-        kind = ContactKind(entry.one_of("kind", [k.value for k in ContactKind], "kind of contact"))
-        own_keys = (_CHATTER,) if kind is ContactKind.IMPACT else _POSITIONED.get(kind, ())
-        entry.only(("kind", *KEYS[kind], *own_keys))
-        texts = {
-            key: _expression(entry, key)
-            for key in KEYS[kind]
-            if key not in _OPTIONAL or entry.data.get(key) is not None
-        }
-        form = _form(entry, _DIRECTION[kind], texts, scope)
-        count = len(coordinates)
+        kind = ContactKind(entry["kind"])
+        texts = {k: text for k, text in entry.items() if k not in ("kind", _AT, _CHATTER)}
+        place, count = (*address, _DIRECTION[kind]), len(coordinates)
+        form = _form(place, entry[_DIRECTION[kind]], scope)
         shift = count if kind is ContactKind.FRICTION else 0
-        direction = _direction(entry, _DIRECTION[kind], form, shift, count)
-        rests = kind is ContactKind.IMPACT and bool(entry.flag(_CHATTER))
-        contact = Contact(name, kind, texts, direction, form, rests)
-        found.append(replace(contact, at=_position(entry, contact, scope)))
+        direction = _direction(place, form, shift, count)
+        contact = Contact(name, kind, texts, direction, form, bool(entry.get(_CHATTER)))
+        found.append(replace(contact, at=_position(address, entry.get(_AT, ""), contact, scope)))
     return found
 
 
-def _position(entry: Part, contact: Contact, scope: Scope[Affine]) -> str:
+def _position(address: Address, text: str, contact: Contact, scope: Scope[Affine]) -> str:
     """Return where a contact is to rest; empty if nothing is said."""
-    if entry.data.get(_AT) is None:
-        return ""
-    text = _expression(entry, _AT)
-    if set(_form(entry, _AT, {_AT: text}, scope).parts) - {CONSTANT}:
-        entry.fail(_AT, f"'{_AT}' is made of numbers and parameters, such as 0.12, got {text}")
-    if contact.kind is ContactKind.FRICTION and not is_at_rest(contact):
-        entry.fail(
-            _AT,
+    place = (*address, _AT)
+    if text and set(_form(place, text, scope).parts) - {CONSTANT}:
+        raise EntryError(
+            place, f"'{_AT}' is made of numbers and parameters, such as 0.12, got {text}"
+        )
+    if text and contact.kind is ContactKind.FRICTION and not is_at_rest(contact):
+        raise EntryError(
+            place,
             f"what '{contact.name}' rubs on moves ({contact.texts['velocity']}), so that it has no place "
             "of rest: leave 'at' out",
         )
@@ -173,44 +157,36 @@ def is_at_rest(contact: Contact) -> bool:
     return all(kind == "y" for kind, _ in contact.form.parts)
 
 
-def _is_jenkins(entry: object) -> bool:
-    return isinstance(entry, Mapping) and entry.get("kind") == ContactKind.JENKINS.value
-
-
-def _expression(entry: Part, key: str) -> str:
-    value = entry.needs(key, "an expression")
-    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
-        entry.fail(key, f"'{key}' is an expression, got {value!r}")
-    return str(value)
-
-
-def _form(entry: Part, key: str, texts: Mapping[str, str], scope: Scope[Affine]) -> Affine:
+def _form(address: Address, text: str, scope: Scope[Affine]) -> Affine:
     try:
-        return scope.evaluate(parse(texts[key]))
+        return scope.evaluate(parse(text))
     except NotAffineError as reason:
-        entry.fail(key, f"'{key}' is linear in the states: {reason}")
+        raise EntryError(address, f"'{address[-1]}' is linear in the states: {reason}") from None
     except ModelError as error:
-        entry.fail(key, str(error))
+        raise EntryError(address, str(error)) from None
 
 
-def _direction(entry: Part, key: str, form: Affine, shift: int, count: int) -> dict[int, float]:
+def _direction(address: Address, form: Affine, shift: int, count: int) -> dict[int, float]:
     """Return the gradient of an affine form by the coordinates (or, shifted, by the velocities)."""
-    what = "velocities" if shift else "coordinates"
+    key, what = address[-1], "velocities" if shift else "coordinates"
     found: dict[int, float] = {}
     for (kind, which), slope in form.parts.items():
         if kind != "y":
             continue
         weight = slope.number
         if weight is None:
-            entry.fail(key, f"the factors of the {what} in '{key}' are numbers, not parameters")
+            raise EntryError(
+                address, f"the factors of the {what} in '{key}' are numbers, not parameters"
+            )
         if not shift <= which < shift + count:
             example = "v1 - v2" if shift else "0.1 - q1"
-            entry.fail(
-                key, f"'{key}' is made of {what}, numbers, parameters and t, such as {example}"
+            raise EntryError(
+                address,
+                f"'{key}' is made of {what}, numbers, parameters and t, such as {example}",
             )
         found[which - shift] = weight
     if not found:
-        entry.fail(key, f"'{key}' has none of the {what}: nothing moves this contact")
+        raise EntryError(address, f"'{key}' has none of the {what}: nothing moves this contact")
     return found
 
 

@@ -41,7 +41,7 @@ from typing import Any
 import sympy
 
 from contfric.models.description import Description, ModeText
-from contfric.models.entries import EntryError, constraints_in
+from contfric.models.entries import EntryError
 from contfric.models.symbols import Formulas
 
 _SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -178,11 +178,9 @@ def crossing_parts(
         If what motion does where they cross does not follow from the fields.
     """
     crossing = CrossingSurfaces(Formulas(description), surfaces)
-    found: dict[str, Any] = {
-        key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
-    }
-    found["departures"] = list(data.get("departures") or [])
-    found["constraints"] = constraints_in(data)
+    found: dict[str, Any] = {k: dict(data[k]) for k in ("observables", "surfaces", "modes")}
+    found["departures"] = list(data["departures"])
+    found["constraints"] = dict(data["constraints"])
     limits = _Limits(crossing, found)
     a, b = surfaces
     matrix, c = crossing.matrix, crossing.rates

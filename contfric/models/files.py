@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.describe import describe, from_text
-from contfric.models.description import Description
-from contfric.models.entries import EntryError
+from contfric.models.entries import EntryError, plain
 from contfric.models.matrices import loaded
 from contfric.models.on_disk import derived
 
@@ -38,20 +37,34 @@ def read_model(path: Path) -> Model:
         located = read_yaml(_file(path))
         try:
             data = loaded(located.data, path.parent)
-            return model_of(_described(data))
+            return from_data(data)
         except EntryError as error:
             located.fail(_written_at(located, error.address), str(error))
     except NotationError as error:
         raise ModelError(str(error)) from None
 
 
-def _described(data: dict[str, Any]) -> str:
-    """Return the text of the description of a model's data; the same data are read once."""
+def from_data(data: Mapping[str, Any]) -> Model:
+    """Build the model of data in the schema of the YAML files; the same data are read once.
+
+    Raises
+    ------
+    EntryError
+        For the first mistake, with the address of its entry.
+    """
+    given = plain(data)  # numpy writes arrays with eight digits, and not whole
     try:
-        source = repr(data)
+        source = repr(given)
     except ValueError:  # a number of more digits than Python prints: whoever reads it says so
-        return describe(data).text
-    return derived("text", source, lambda: describe(data).text)
+        return model_of(_read_as_text(given))
+    return model_of(derived("text", source, lambda: _read_as_text(given)))
+
+
+def _read_as_text(data: dict[str, Any]) -> str:
+    # what reads a model is loaded where one is read, and not where it was read before
+    from contfric.models.describe import describe
+
+    return describe(data).text
 
 
 def _written_at(located: LocatedYaml, address: Address) -> Address:
@@ -73,11 +86,6 @@ def _file(path: Path) -> Path:
     )
 
 
-def built(description: Description) -> Model:
-    """Return the model of a description; the same one for the same description."""
-    return model_of(description.text)
-
-
 @lru_cache(maxsize=64)
 def model_of(definition: str) -> Model:
     """Return the model of a definition: a description as text.
@@ -93,6 +101,7 @@ def model_of(definition: str) -> Model:
 def _model_from(definition: str) -> Model:
     from contfric.models.build import prepare
     from contfric.models.derive import model_from
+    from contfric.models.describe import from_text
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place

@@ -59,9 +59,7 @@ def sliding_parts(
             ("kinks",),
             "sliding is derived where fields are smooth near their surfaces: no 'kinks'",
         )
-    found: dict[str, Any] = {
-        key: dict(data.get(key) or {}) for key in ("observables", "surfaces", "modes")
-    }
+    found: dict[str, Any] = {k: dict(data[k]) for k in ("observables", "surfaces", "modes")}
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
     slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
     # where nothing slides all pass, where surfaces cross, too

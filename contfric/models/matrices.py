@@ -16,7 +16,7 @@ import numpy as np
 
 from contfric.errors import ModelError, did_you_mean, shown
 from contfric.models.definition import FloatArray
-from contfric.models.entries import EntryError, Part
+from contfric.models.entries import EntryError, known_keys
 from contfric.models.grammar import number_of
 
 #: Rows of expressions.
@@ -36,47 +36,29 @@ def is_zero(text: str) -> bool:
         return False
 
 
-def matrix_of(key: str, value: Any, size: int, default: str | None = None) -> Texts:
+def matrix_of(key: str, value: Any, size: int) -> Texts:
     """Return a matrix as rows of expressions.
 
     Raises
     ------
     EntryError
-        If it is no matrix, or has another size.
+        If it has another size.
     """
     wanted = (
         f"'{key}' is a matrix of {size} rows of {size}: a list of rows, a list of its diagonal, one "
         f"expression (times identity), or '{IDENTITY}'"
     )
-    if value is None and default is not None:
-        value = default
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
-        value = ["1" if value == IDENTITY else value] * size
-    if isinstance(value, Sequence) and not isinstance(value, str) and len(value) != size:
+    rows = value if isinstance(value, list) else ["1" if value == IDENTITY else value] * size
+    if len(rows) != size:
         raise EntryError(
-            (key,), f"{wanted}; it has {len(value)} rows, and there are {size} coordinates"
+            (key,), f"{wanted}; it has {len(rows)} rows, and there are {size} coordinates"
         )
-    if not isinstance(value, Sequence) or isinstance(value, str):
-        raise EntryError((key,), f"{wanted}; got {shown(value)}")
-    rows = list(value)
-    if not any(isinstance(row, (list, tuple)) for row in rows):
+    if not isinstance(rows[0], list):
         rows = [[entry if i == j else 0 for j in range(size)] for i, entry in enumerate(rows)]
     for i, row in enumerate(rows):
-        if not isinstance(row, (list, tuple)) or len(row) != size:
+        if len(row) != size:
             raise EntryError((key, i), f"{wanted}; row {i + 1} is {shown(row)}")
-    return [[_text(key, i, entry) for entry in row] for i, row in enumerate(rows)]
-
-
-def _text(key: str, row: int, entry: Any) -> str:
-    if isinstance(entry, bool) or not isinstance(entry, (str, int, float)):
-        raise EntryError((key, row), f"an entry of '{key}' is an expression, got {shown(entry)}")
-    if not isinstance(entry, str) and not np.isfinite(entry):
-        raise EntryError(
-            (key, row), f"an entry of '{key}' is {entry}: it has to be a finite number"
-        )
-    return entry if isinstance(entry, str) else repr(float(entry))
+    return [[x if isinstance(x, str) else repr(float(x)) for x in row] for row in rows]
 
 
 def loaded(data: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -95,43 +77,48 @@ def loaded(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     for key in ("mass", "damping", "stiffness"):
         value = data.get(key)
         if isinstance(value, Mapping):
-            part = Part({str(k): v for k, v in value.items()}, (key,))
-            part.only(("file", "array"))
-            found[key] = _from_file(part, folder / part.text("file"))
+            known_keys(map(str, value), ("file", "array"), (key,))
+            file, array = value.get("file"), value.get("array", "")
+            for name, text in (("file", file), ("array", array)):
+                if not isinstance(text, str):
+                    raise EntryError((key, name), f"'{name}' must be a text, got {text!r}")
+            try:
+                found[key] = _from_file(folder / str(file), str(array))
+            except ModelError as error:
+                raise EntryError((key,), str(error)) from None
     return found
 
 
-def _from_file(part: Part, path: Path) -> Any:
+def _from_file(path: Path, array: str) -> Any:
     """Read a matrix: an array of an npz, or a MatrixMarket file."""
     if not path.is_file():
-        part.fail("file", f"there is no file {path}")
+        raise ModelError(f"there is no file {path}")
     try:
         if path.suffix == ".mtx":
             from scipy.io import mmread
 
-            return _real(part, path.name, mmread(path))
+            return _real(path.name, mmread(path))
         if path.suffix != ".npz":
-            part.fail("file", f"{path.name} is no npz with named arrays, and no .mtx")
+            raise ModelError(f"{path.name} is no npz with named arrays, and no .mtx")
         if not is_zipfile(path):
-            part.fail("file", f"{path.name} is no npz file")
+            raise ModelError(f"{path.name} is no npz file")
         with np.load(path, allow_pickle=False) as arrays:
-            if "array" not in part.data:
-                part.fail(None, f"say which array of {path.name}: {', '.join(arrays.files)}")
-            name = part.text("array")
-            if name not in arrays.files:
-                hint = did_you_mean(name, arrays.files)
-                part.fail("array", f"{path.name} has no array '{name}'{hint}")
-            return _real(part, f"'{name}' of {path.name}", arrays[name])
+            if not array:
+                raise ModelError(f"say which array of {path.name}: {', '.join(arrays.files)}")
+            if array not in arrays.files:
+                hint = did_you_mean(array, arrays.files)
+                raise ModelError(f"{path.name} has no array '{array}'{hint}")
+            return _real(f"'{array}' of {path.name}", arrays[array])
     except (OSError, ValueError) as error:
-        part.fail("file", f"{path.name} cannot be read: {error}")
+        raise ModelError(f"{path.name} cannot be read: {error}") from None
 
 
-def _real(part: Part, name: str, matrix: Any) -> FloatArray:
+def _real(name: str, matrix: Any) -> FloatArray:
     """Return what a file has as an array of real numbers."""
     found = dense(matrix)
     if found.dtype.kind not in "iuf" or found.ndim not in (1, 2):
         what = f"{found.ndim} dimensions of {found.dtype.name}"
-        part.fail("file", f"{name} has {what}: a matrix has rows of real numbers")
+        raise ModelError(f"{name} has {what}: a matrix has rows of real numbers")
     return np.asarray(found, dtype=np.float64)
 
 

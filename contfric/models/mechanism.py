@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from contfric.errors import ModelError
 from contfric.models.definition import Model
-from contfric.models.describe import describe
-from contfric.models.entries import EntryError
-from contfric.models.files import built
-from contfric.models.matrices import dense
+from contfric.models.entries import EntryError, plain
+from contfric.models.files import from_data
 from contfric.models.structure_names import COORDINATES
 
 
@@ -54,22 +50,22 @@ def Mechanism(  # the name that is promised: it makes a model as a class makes a
     ...              parameters={"Omega": 0.5, "S": 0.3, "S0": 0.4}, period="2*pi/Omega").states
     ('q1', 'v1')
     """
-    mass, damping, stiffness = (_rows(matrix) for matrix in (mass, damping, stiffness))
+    mass, damping, stiffness = map(plain, (mass, damping, stiffness))
     size = _size(stiffness, mass, damping) if coordinates is None else len(coordinates)
     data: dict[str, Any] = {
         "name": name,
         COORDINATES: coordinates or [f"q{i}" for i in range(1, size + 1)],
-        "parameters": _plain({} if parameters is None else parameters),
+        "parameters": {} if parameters is None else parameters,
         "mass": mass,
         "damping": damping,
         "stiffness": stiffness,
-        "force": _plain({} if force is None else force),
-        "contacts": _plain(contacts),
+        "force": {} if force is None else force,
+        "contacts": contacts,
         **({"period": period} if period else {"autonomous": True}),
-        **{key: _plain(value) for key, value in more.items()},
+        **more,
     }
     try:
-        return built(describe(data))
+        return from_data(data)
     except EntryError as error:
         where = " -> ".join(map(str, error.address))
         raise ModelError(f"model '{name}', {where or 'as a whole'}: {error}") from None
@@ -84,20 +80,3 @@ def _size(*matrices: Any) -> int:
         "none of these matrices has rows, so they do not say how many coordinates there are: "
         "give 'stiffness' as rows, or coordinates=['q1', ...]"
     )
-
-
-def _plain(value: Any) -> Any:
-    """Return what a file could say: mappings as dictionaries, numbers of numpy as Python's, arrays as lists.
-
-    What an entry has to be is checked where files are read, whatever it is here.
-    """
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    return value
-
-
-def _rows(matrix: Any) -> Any:
-    is_array = isinstance(matrix, np.ndarray) or hasattr(matrix, "toarray")
-    return dense(matrix).tolist() if is_array else matrix

@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.describe import describe
 from contfric.models.entries import EntryError
-from contfric.models.files import built
+from contfric.models.files import from_data
 from contfric.models.grammar import TIME
 
 #: Likeness of two names from which one is a slip of the pen: a letter left out, added or exchanged.
@@ -136,7 +135,7 @@ def model_of_class(oscillator: OscillatorModel) -> Model:
         If a method fails, or what it returns is no model: class, entry, and what would be valid.
     """
     try:
-        return built(describe(_data(oscillator)))
+        return from_data(_data(oscillator))
     except EntryError as error:
         place = " > ".join(str(key) for key in error.address) or "class"
         raise ModelError(f"{type(oscillator).__name__}, {place}: {error}") from None

@@ -1,4 +1,4 @@
-"""The quantities that a model's file declares: read, and checked in their place.
+"""The quantities that a model's file declares, checked in their place.
 
     quantities:
       energy: integral(c*v**2 + S*abs(v))
@@ -14,23 +14,12 @@ from collections.abc import Mapping, Sequence
 
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
-from contfric.models.entries import EntryError, Part
+from contfric.models.entries import EntryError
 from contfric.models.grammar import PI, check_name
 from contfric.models.names import Names
 from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, WORK, no_contact, read
 
 KEY = "quantities"
-
-
-def read_quantities(top: Part) -> tuple[tuple[str, str], ...]:
-    """Return the names and expressions of a model's quantities, in their order."""
-    part = top.part(KEY, "a mapping of names to expressions, such as {energy: integral(c*v**2)}")
-    found = []
-    for name, text in part.data.items():
-        if isinstance(text, bool) or not isinstance(text, (str, int, float)):
-            part.fail(name, f"'{name}' must be an expression, got {text!r}")
-        found.append((name, " ".join(str(text).split())))
-    return tuple(found)
 
 
 def check_quantities(

@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from contfric.models.description import Description, Range
-from contfric.models.entries import EntryError, Part
+from contfric.models.entries import EntryError, known_keys
 from contfric.models.evaluate import defaults, floats
 from contfric.models.names import Names
 
 
-def spread_of(top: Part, states: tuple[str, ...]) -> tuple[str, ...]:
+def spread_of(spread: Mapping[str, Any], states: tuple[str, ...]) -> tuple[str, ...]:
     """Return the half-width of each state; of a range, half of its length."""
-    part = top.part("spread", "a mapping of states to half-widths, or to ranges such as [0, 1]")
-    part.only(states)
-    ranges = dict(zip(states, ranges_of(top, states), strict=False))
-    half = {state: f"(({ends[1]}) - ({ends[0]}))/2" for state, ends in ranges.items() if ends}
-    given = {name: half.get(name) or part.expression(name) for name in part.data}
-    return tuple(given.get(state, "1") for state in states)
+    known_keys(spread, states, ("spread",))
+    half = {s: f"(({w[1]}) - ({w[0]}))/2" if isinstance(w, list) else w for s, w in spread.items()}
+    return tuple(half.get(state, "1") for state in states)
 
 
-def ranges_of(top: Part, states: tuple[str, ...]) -> tuple[Range, ...]:
+def ranges_of(spread: Mapping[str, Any], states: tuple[str, ...]) -> tuple[Range, ...]:
     """Return the lowest and the highest value of each state that has a range, nothing of others."""
-    part = top.part("spread", "a mapping of states to half-widths, or to ranges such as [0, 1]")
-    found: dict[str, Range] = {}
-    for name, value in part.data.items():
-        if not isinstance(value, (list, tuple)):
-            continue
-        if len(value) != 2:
-            part.fail(
-                name, f"a range has a lowest and a highest value, such as [0, 1], got {value!r}"
-            )
-        ends = Part({"lowest": value[0], "highest": value[1]}, (*part.address, name))
-        found[name] = ends.expression("lowest"), ends.expression("highest")
+    found: dict[str, Range] = {s: (w[0], w[1]) for s, w in spread.items() if isinstance(w, list)}
     return tuple(found.get(state, ()) for state in states) if found else ()
 
 

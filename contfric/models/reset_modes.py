@@ -5,47 +5,45 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from contfric.models.entries import Part, listed
+from contfric.base.yaml_lines import Address
+from contfric.models.entries import known_sides, one_of
 from contfric.models.parts import Lead
 
 #: Their keys.
 TO, FROM = "to", "from"
 
 
-def leads_of(entry: Part, modes: list[str], surfaces: list[str]) -> tuple[Lead, ...]:
+def leads_of(
+    entry: Mapping[str, Any], modes: list[str], surfaces: list[str], address: Address
+) -> tuple[Lead, ...]:
     """Return the modes that a reset leads into: one, the first of a list, or the first whose sides hold.
 
     A mode may be led into from some modes only: ``{heat: {from: waiting}}``.
     """
     found = []
-    for mode, sides in _pairs(entry.data[TO]):
-        Part({TO: mode}, entry.address).one_of(TO, modes, "mode")
-        part = Part({mode: _without_from(sides)}, (*entry.address, TO))
-        asked = isinstance(sides, Mapping) and FROM in sides
-        after = acts_of(Part(sides, (*part.address, mode)), modes) if asked else ()
-        found.append(Lead(mode, part.sides(mode, surfaces), after))
+    for led in entry[TO]:
+        for mode, asked in led.items():
+            one_of(mode, modes, "mode", (*address, TO))
+            place = (*address, TO, mode)
+            sides = {surface: side for surface, side in asked.items() if surface != FROM}
+            after = acts_of(asked, modes, place) if FROM in asked else ()
+            found.append(Lead(mode, known_sides(sides, surfaces, place), after))
     return tuple(found)
 
 
-def _pairs(given: Any) -> list[tuple[str, Any]]:
-    """Return the modes that are led into, each with its sides, in their order."""
+def pairs_of(given: Any) -> list[Any]:
+    """Return the modes that are led into as a list of ``{mode: sides}``, in their order."""
     if isinstance(given, Mapping):
-        return [(str(mode), sides) for mode, sides in given.items()]
+        return [{mode: {} if sides is None else sides} for mode, sides in given.items()]
+    items = given if isinstance(given, (list, tuple)) else [given]
     return [
-        pair
-        for item in listed(given)
-        for pair in (_pairs(item) if isinstance(item, Mapping) else [(str(item), {})])
+        pair for x in items for pair in (pairs_of(x) if isinstance(x, Mapping) else [{str(x): {}}])
     ]
 
 
-def _without_from(sides: Any) -> Any:
-    return {k: v for k, v in sides.items() if k != FROM} if isinstance(sides, Mapping) else sides
-
-
-def acts_of(entry: Part, modes: list[str]) -> tuple[str, ...]:
+def acts_of(entry: Mapping[str, Any], modes: list[str], address: Address) -> tuple[str, ...]:
     """Return the modes that a reset acts in."""
-    named = Part({str(i): v for i, v in enumerate(listed(entry.data[FROM]))}, entry.address)
-    return tuple(named.one_of(key, modes, "mode") for key in named.data)
+    return tuple(one_of(mode, modes, "mode", (*address, FROM)) for mode in entry[FROM])
 
 
 def named_parts(
@@ -56,15 +54,15 @@ def named_parts(
     Where a reset leads into modes from some modes, the mode before goes on elsewhere, in any of its parts.
     """
 
-    def named(given: Any) -> list[str]:
-        return [part for m in listed(given) for part in parts.get(m, (m,))]
+    def named(given: list[str]) -> list[str]:
+        return [part for m in given for part in parts.get(m, (m,))]
 
     def led_into(given: Any) -> list[Any]:
         found: list[Any] = []
-        for mode, sides in _pairs(given):
-            asked = FROM in (sides or {})
-            inside = {**sides, FROM: named(sides[FROM])} if asked else sides
-            found += [{part: inside} if inside else part for part in parts.get(mode, (mode,))]
+        for pair in pairs_of(given):
+            for mode, sides in pair.items():
+                inside = {**sides, FROM: named(sides[FROM])} if FROM in sides else sides
+                found += [{part: inside} for part in parts.get(mode, (mode,))]
         goes_on = [{part: {FROM: [*own]}} for own in parts.values() for part in own]
         return [*found, *goes_on]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -19,6 +20,14 @@ OTHERS: tuple[Place, ...] = (
     *(("period",), ("spread", None), ("surfaces", None, "level"), ("quantities", None)),
     *(("forces", None, "texts", None), ("forces", None, "rest"), ("forces", None, "at")),
 )
+
+
+def tree_of(text: str) -> ast.Expression | None:
+    """Return an expression as a tree; None if it is none, of which whoever reads it says what is wrong."""
+    try:
+        return ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
 
 
 def rewritten(

@@ -1,4 +1,4 @@
-"""What a model says in short, written out: structures, ties, clocks, angles, units, sliding, observables.
+"""What a model says in short, written out: ties, clocks, angles, units, sliding, observables.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -14,9 +14,8 @@ from typing import Any
 from contfric.errors import ModelError
 from contfric.models.angles import with_angles
 from contfric.models.clocks import value_at_defaults, with_clock
-from contfric.models.contact_modes import with_contacts
 from contfric.models.description import Description
-from contfric.models.entries import EntryError, Part, as_identifier, listed, mapping_in
+from contfric.models.entries import EntryError, as_identifier
 from contfric.models.grammar import PERIOD, RESERVED
 from contfric.models.reset_modes import FROM, TO, named_parts
 from contfric.models.tied import with_ties_put_in
@@ -28,6 +27,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
 
     Parameters
     ----------
+    data : in the form of :mod:`contfric.models.schema`
     read : reads what is written out
 
     Raises
@@ -35,10 +35,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     EntryError
         For the first mistake, with the address of its entry.
     """
-    data = with_contacts(data)
-    if not _is_regular(data):
-        return read(data)  # which says what is wrong, and where
-    if not data.get("surfaces") and "modes" not in data and "field" in data:
+    if not data["surfaces"] and not data["modes"] and "field" in data:
         data = {**data, **_smooth(data)}
     data, parts = _divided_by_resets(_with_observables(_with_period(with_ties_put_in(data))))
     walls, data = _chattering(data)
@@ -63,13 +60,12 @@ def _smooth(data: Mapping[str, Any]) -> dict[str, Any]:
 
     Along any cycle the first state stands still somewhere.
     """
-    state = next(iter(data["states"]), "")
-    rate = data["field"].get(state)
-    if not data.get("autonomous") or data.get("angles") or rate is None:
-        return {"modes": {"smooth": {}}}
+    rate = data["field"].get(data["states"][0])
+    if not data.get("autonomous") or data["angles"] or rate is None:
+        return {"modes": {"smooth": {"in": {}}}}
     sides = {"smooth": "+", "smooth-": "-"}
     return {
-        "surfaces": {"section": {"observable": str(rate)}},
+        "surfaces": {"section": {"observable": rate, "level": "0"}},
         "modes": {mode: {"in": {"section": side}} for mode, side in sides.items()},
     }
 
@@ -91,70 +87,42 @@ def _divided(
 
 #: The parts of modes that resets divide.
 Parts = Mapping[str, tuple[str, ...]]
-#: Parts of a model that are mappings, and those of them whose entries are mappings.
-_MAPPINGS = (
-    "parameters",
-    "define",
-    "observables",
-    "field",
-    "spread",
-    "surfaces",
-    "modes",
-    "resets",
-    "quantities",
-)
-_NESTED = ("surfaces", "modes", "resets")
-
-
-def _is_regular(data: Mapping[str, Any]) -> bool:
-    """Tell whether the parts of a model are of the kinds that they should be."""
-    parts = [data[key] for key in _MAPPINGS if data.get(key) is not None]
-    entries = [
-        e for key in _NESTED if isinstance(data.get(key), Mapping) for e in data[key].values()
-    ]
-    own = [e["field"] for e in entries if isinstance(e, Mapping) and "field" in e]
-    lists = isinstance(data.get("states"), (list, tuple))
-    return lists and all(isinstance(part, Mapping) for part in (*parts, *entries, *own))
 
 
 def _with_period(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which the period stands for T in levels: a switch at ``T/2``."""
-    period, surfaces = data.get("period"), mapping_in(data, "surfaces")
-    taken = PERIOD in mapping_in(data, "parameters") or PERIOD in mapping_in(data, "define")
-    if taken or isinstance(period, bool) or not isinstance(period, (str, int, float)):
+    if PERIOD in data["parameters"] or PERIOD in data["define"] or "period" not in data:
         return data
-
-    def written(entry: Mapping[str, Any]) -> dict[str, Any]:
-        level = entry.get("level")
-        found = re.sub(rf"\b{PERIOD}\b", f"({period})", level) if isinstance(level, str) else level
-        return {**entry, **({"level": found} if found != level else {})}
-
-    return {**data, "surfaces": {name: written(entry) for name, entry in surfaces.items()}}
+    period = f"({data['period']})"
+    surfaces = {
+        name: {**entry, "level": re.sub(rf"\b{PERIOD}\b", lambda _: period, entry["level"])}
+        for name, entry in data["surfaces"].items()
+    }
+    return {**data, "surfaces": surfaces}
 
 
 def _with_observables(data: dict[str, Any]) -> dict[str, Any]:
     """Return a model in which an expression that a surface is the zero of has a name: that of the surface."""
-    surfaces, observables = data.get("surfaces") or {}, dict(data.get("observables") or {})
-    parts = {str(name) for name in data.get("define") or {}}
-    taken = {*map(str, data.get("states") or ()), *map(str, data.get("parameters") or ()), *parts}
-    taken |= {*RESERVED}  # a surface may be called sign
-    named: dict[Any, Any] = {}
+    observables, parts = dict(data["observables"]), data["define"]
+    # a surface may be called sign
+    taken = {*data["states"], *data["parameters"], *parts, *RESERVED}
+    named: dict[str, Any] = {}
     known: dict[str, str] = {}
-    for name, entry in surfaces.items():
+    for name, entry in data["surfaces"].items():
         named[name] = entry
-        text = entry.get("observable")
-        if not isinstance(text, str) or (text.strip().isidentifier() and text.strip() not in parts):
+        text = entry["observable"]
+        if text.isidentifier() and text not in parts:
             continue
         if text in known:  # levels of one expression are ordered
             named[name] = {**entry, "observable": known[text]}
             continue
-        own = as_identifier(str(name))
+        own = as_identifier(name)
         while own in taken or own in observables:
             own += "_"
         known[text] = own
         observables[own] = text
         named[name] = {**entry, "observable": own}
-    return {**data, "surfaces": named, "observables": observables} if observables else data
+    return {**data, "surfaces": named, "observables": observables}
 
 
 def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
@@ -165,19 +133,18 @@ def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
     where two resets name it. A reset at a place of an angle acts in all modes, if none has a side: rotations
     pass it.
     """
-    modes, resets = dict(data.get("modes") or {}), dict(data.get("resets") or {})
-    surfaces, angles = mapping_in(data, "surfaces"), listed(data.get("angles") or ())
-    others = (data.get("domains") or {}).values()
-    named = {other.get("mode") for other in others if isinstance(other, Mapping)}
+    modes, resets, surfaces = dict(data["modes"]), dict(data["resets"]), data["surfaces"]
+    named = {domain["mode"] for domain in data["domains"].values()}
     divides: dict[str, list[str]] = {}  # the surfaces that divide each mode
     for surface, entry in resets.items():
         asked = entry.get(FROM)
-        sided = any(surface in mapping_in(mode, "in") for mode in modes.values())
-        if asked is None and not sided and surfaces.get(surface, {}).get("observable") in angles:
+        sided = any(surface in mode["in"] for mode in modes.values())
+        at = surfaces.get(surface, {}).get("observable")
+        if asked is None and not sided and at in data["angles"]:
             asked = [*modes]
             resets[surface] = {**entry, FROM: asked}
-        for name in () if asked is None else map(str, listed(asked)):
-            sides = mapping_in(modes[name], "in") if name in modes else {surface: 0}
+        for name in asked or ():
+            sides = modes[name]["in"] if name in modes else {surface: 0}
             if surface not in sides and name not in named:
                 divides.setdefault(name, []).append(surface)
     parts: dict[str, tuple[str, ...]] = {}
@@ -186,17 +153,13 @@ def _divided_by_resets(data: dict[str, Any]) -> tuple[dict[str, Any], Parts]:
         own = [f"{name}{''.join(sides)}" for sides in signs]
         if not modes.keys() & {*own}:
             whole, parts[name] = modes[name], tuple(own)
-            inside = [
-                {**mapping_in(whole, "in"), **dict(zip(between, s, strict=True))} for s in signs
-            ]
+            inside = [{**whole["in"], **dict(zip(between, s, strict=True))} for s in signs]
             divided = {n: {**whole, "in": sides} for n, sides in zip(own, inside, strict=True)}
             modes = {  # in their order: of modes that overlap a start is in the first
                 n: m
                 for old, entry in modes.items()
                 for n, m in (divided if old == name else {old: entry}).items()
             }
-    if not resets:
-        return data, {}
     if parts:
         resets = named_parts(resets, parts)
     return {**data, "modes": modes, "resets": resets}, parts
@@ -207,7 +170,7 @@ def _going_on(data: dict[str, Any], before: Mapping[str, Any], parts: Parts) -> 
 
     Other modes may hold there, too, if they overlap; the user did not write these resets.
     """
-    own, resets = mapping_in(before, "resets"), mapping_in(data, "resets")
+    own, resets = before["resets"], data["resets"]
     goes_on = [{part: {FROM: [*all_]}} for all_ in parts.values() for part in all_]
     fresh = {s: {**entry, TO: goes_on} for s, entry in resets.items() if s not in own and goes_on}
     return {**data, "resets": {**resets, **fresh}} if fresh else data
@@ -217,37 +180,28 @@ def _is_somewhere(sides: Sequence[str], surfaces: Sequence[str], data: Mapping[s
     """Return whether a state can have some sides of surfaces: not below one level and above a higher one."""
     found: dict[object, tuple[list[float], list[float]]] = {}
     for side, name in zip(sides, surfaces, strict=True):
-        entry = mapping_in(data, "surfaces").get(name, {})
+        entry = data["surfaces"].get(name, {})
         # whoever reads the level says what is wrong
         with suppress(ModelError, ArithmeticError, SyntaxError):
-            level = value_at_defaults(str(entry.get("level", 0)), data)
+            level = value_at_defaults(entry.get("level", "0"), data)
             found.setdefault(entry.get("observable"), ([], []))[side == "+"].append(level)
     return all(not (above and below) or max(above) < min(below) for below, above in found.values())
 
 
 def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Return the surfaces on which sliding is to be derived, and the model without saying so."""
-    surfaces = data.get("surfaces")
-    if not isinstance(surfaces, Mapping):
-        return (), data
-    asked, plain = [], {}
-    for name, entry in surfaces.items():
-        plain[str(name)] = entry
-        if isinstance(entry, Mapping) and entry.get("sliding") is not None:
-            Part(entry, ("surfaces", str(name))).one_of("sliding", ["filippov"], "sliding")
-            asked.append(str(name))
-            plain[str(name)] = {k: v for k, v in entry.items() if k != "sliding"}
-    return tuple(asked), {**data, "surfaces": plain}
+    surfaces = data["surfaces"]
+    asked = tuple(name for name, entry in surfaces.items() if "sliding" in entry)
+    plain = {n: {k: v for k, v in e.items() if k != "sliding"} for n, e in surfaces.items()}
+    return asked, {**data, "surfaces": plain}
 
 
 def _chattering(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
     """Return the walls at which chatter is to be derived, and the model without saying so."""
-    asked, plain = [], {}
-    for name, entry in (data.get("resets") or {}).items():
-        plain[name] = {key: value for key, value in entry.items() if key != "chatter"}
-        if Part(entry, ("resets", str(name))).flag("chatter"):
-            asked.append(str(name))
-    return tuple(asked), {**data, "resets": plain} if asked else data
+    resets = data["resets"]
+    asked = tuple(name for name, entry in resets.items() if entry.get("chatter"))
+    plain = {n: {k: v for k, v in e.items() if k != "chatter"} for n, e in resets.items()}
+    return asked, {**data, "resets": plain}
 
 
 def _with_fields(data: Mapping[str, Any]) -> dict[str, Any]:

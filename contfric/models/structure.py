@@ -7,15 +7,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from contfric.models.contact_ranges import check_ranges
 from contfric.models.contacts import Contact, ContactKind, drift, factor_of, read_contacts
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError, known_keys
 from contfric.models.matrices import Mass, Texts, folded, is_zero, mass_of, matrix_of, summed, times
 from contfric.models.shared_loads import Setting, SharedLoads
-from contfric.models.structure_names import COORDINATES, check_known, check_names, check_states
+from contfric.models.structure_names import check_known, check_states
 
 #: Most combinations of states of contacts that are listed, each a mode with regions of its own.
 _MOST_MODES = 243
@@ -33,7 +34,7 @@ class Structure:
     forces : of the coordinates, without contacts: ``f - C q' - K q``
     """
 
-    top: Part
+    data: Mapping[str, Any]
     coordinates: tuple[str, ...]
     velocities: tuple[str, ...]
     mass: Mass
@@ -41,44 +42,44 @@ class Structure:
     contacts: tuple[Contact, ...]
 
     @classmethod
-    def read(cls, top: Part) -> Structure:
-        """Read a structure."""
-        coordinates = _coordinates(top)
+    def read(cls, data: Mapping[str, Any]) -> Structure:
+        """Return the structure of data in the form of :mod:`contfric.models.schema`.
+
+        Raises
+        ------
+        EntryError
+            For the first mistake.
+        """
+        coordinates = tuple(data["coordinates"])
         size = len(coordinates)
         velocities = tuple(f"v{i}" for i in range(1, size + 1))
-        check_states(coordinates, velocities, mapping_in(top.data, "contacts"))
-        params = defaults_of(top)
-        mass = mass_of(matrix_of("mass", top.data.get("mass"), size, "identity"), params)
-        damping, stiffness = (
-            matrix_of(key, top.data.get(key), size, "0") for key in ("damping", "stiffness")
-        )
-        given = top.part("force", "a mapping of coordinates to expressions")
-        given.only(coordinates)
+        check_states(coordinates, velocities, data["contacts"])
+        params = defaults_of(data)
+        mass = mass_of(matrix_of("mass", data["mass"], size), params)
+        damping, stiffness = (matrix_of(key, data[key], size) for key in ("damping", "stiffness"))
+        known_keys(data["force"], coordinates, ("force",))
         forces = tuple(
-            _force(str(given.data.get(q, "0")), i, coordinates, velocities, damping, stiffness)
+            _force(data["force"].get(q, "0"), i, coordinates, velocities, damping, stiffness)
             for i, q in enumerate(coordinates)
         )
-        contacts = read_contacts(
-            top.part("contacts", "a mapping of names to contacts"),
-            coordinates,
-            velocities,
-            tuple(params),
-            {str(k): str(v) for k, v in mapping_in(top.data, "define").items()},
-        )
+        contacts = read_contacts(data, coordinates, velocities, tuple(params))
         if not contacts:
             raise EntryError(("contacts",), "a structure has at least one contact")
-        known = {*coordinates, *velocities, *params, "t", "pi", *(c.name for c in contacts)}
-        known |= {*mapping_in(top.data, "define"), *mapping_in(top.data, "observables")}
-        known |= {*mapping_in(top.data, "parameters")}
-        for key in ("damping", "stiffness", "force"):
-            check_names(top, key, size, known)
+        known = {*coordinates, *velocities, "t", "pi", *data["contacts"]}
+        known |= {*data["define"], *data["observables"], *data["parameters"]}
+        for key, rows in ("damping", damping), ("stiffness", stiffness):
+            for row, texts in enumerate(rows):
+                for text in texts:
+                    check_known((key, row), text, known)
+        for name, text in data["force"].items():
+            check_known(("force", name), text, known)
         known |= {"T", *(f"f_{q}" for q in coordinates)}
         for contact in contacts:
             for key, text in contact.texts.items():
                 check_known(("contacts", contact.name, key), text, known)
-        found = cls(top, coordinates, velocities, mass, forces, tuple(contacts))
+        found = cls(data, coordinates, velocities, mass, forces, tuple(contacts))
         found.check()
-        check_ranges(contacts, params, mapping_in(top.data, "define"))
+        check_ranges(contacts, params, data["define"])
         return found
 
     # ------------------------------------------------------------------------------- checks
@@ -92,8 +93,8 @@ class Structure:
     @property
     def _made_when_visited(self) -> bool:
         """Whether modes can be made when a solution visits them."""
-        numbers = set(defaults_of(self.top)) == set(mapping_in(self.top.data, "parameters"))
-        return numbers and "units" not in self.top.data and not self._has_impacts
+        numbers = set(defaults_of(self.data)) == set(self.data["parameters"])
+        return numbers and not self.data["units"] and not self._has_impacts
 
     @cached_property
     def loads(self) -> SharedLoads:
@@ -212,32 +213,9 @@ class Structure:
         }
 
 
-def _coordinates(top: Part) -> tuple[str, ...]:
-    value = top.data[COORDINATES]
-    if isinstance(value, Mapping) and len(value) == 1:  # q: 20
-        (name, count), *_ = value.items()
-        if isinstance(count, int) and not isinstance(count, bool) and count >= 1:
-            return tuple(f"{name}{i}" for i in range(1, count + 1))
-    if (
-        not isinstance(value, (list, tuple))
-        or not value
-        or not all(isinstance(q, str) for q in value)
-    ):
-        top.fail(
-            COORDINATES,
-            f"'{COORDINATES}' is a list of names such as [q1, q2], or {{q: 20}}, got {value!r}",
-        )
-    return tuple(value)
-
-
-def defaults_of(top: Part) -> dict[str, float]:
-    """Return the defaults of the parameters that are numbers; others are refused where they are read."""
-    found = {}
-    for name, value in mapping_in(top.data, "parameters").items():
-        given = value.get("default") if isinstance(value, Mapping) else value
-        if isinstance(given, (int, float)) and not isinstance(given, bool):
-            found[name] = float(given)
-    return found
+def defaults_of(data: Mapping[str, Any]) -> dict[str, float]:
+    """Return the defaults of the parameters that are numbers, and follow no others."""
+    return {n: entry["default"] for n, entry in data["parameters"].items() if "default" in entry}
 
 
 def _force(

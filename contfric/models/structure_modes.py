@@ -30,7 +30,7 @@ from contfric.models.contact_laws import ContactLaws, law_of, rest_of
 from contfric.models.contact_modes import Combinations
 from contfric.models.contacts import Contact, ContactKind
 from contfric.models.description import ModeText
-from contfric.models.entries import SIDES, Part
+from contfric.models.entries import SIDES
 from contfric.models.made import Made
 from contfric.models.parts import Domain, Mode, Surface
 from contfric.models.phases import PART, PhaseParts
@@ -64,7 +64,7 @@ class Composition:
     """
 
     def __init__(self, description: Description) -> None:
-        structure = Structure.read(Part(description.structure))
+        structure = Structure.read(description.structure)
         self.structure, self.states = structure, description.states
         self._description = description
         self._parts = Combinations(structure)

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from contfric.errors import ModelError, did_you_mean
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError
 from contfric.models.grammar import check_name, names_in, parse
-from contfric.models.matrices import matrix_of
 
 COORDINATES = "coordinates"
 
@@ -29,22 +28,10 @@ def check_states(
             )
         taken[name] = "coordinate"
     for name, given in contacts.items():
-        if name in taken and isinstance(given, Mapping) and given.get("kind") == "jenkins":
+        if name in taken and given["kind"] == "jenkins":
             raise EntryError(
                 ("contacts", name), f"the stretch of '{name}' has the name of a {taken[name]}"
             )
-
-
-def check_names(top: Part, key: str, size: int, known: set[str]) -> None:
-    """Look up the names in a matrix or in the forces, each in its row."""
-    given = top.data.get(key)
-    if key == "force":
-        for name, text in mapping_in(top.data, key).items():
-            check_known((key, name), str(text), known)
-        return
-    for row, texts in enumerate(matrix_of(key, given, size, "0")):
-        for text in texts:
-            check_known((key, row), text, known)
 
 
 def check_known(address: tuple[str | int, ...], text: str, known: set[str]) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.models.rewriting import OF_MODES, OTHERS, SHARED, rewritten, tree_of
 
 if TYPE_CHECKING:
     from contfric.models import ModelSource
@@ -74,32 +75,22 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
     """
     from contfric.errors import ModelError
     from contfric.models import load_model
-    from contfric.models.describe import describe, from_text
-    from contfric.models.files import built
-    from contfric.models.grammar import names_in, parse
+    from contfric.models.describe import from_text
+    from contfric.models.files import from_data
 
-    left = [name for name in model.parameter_names if name not in ties]
-    for name, text in ties.items():
+    for name in ties:
         model.index_of(name)
-        try:
-            used = names_in(parse(text)) - {"pi"}
-        except ModelError as error:
-            raise ParameterError(f"{name}: {{tie: {text}}}: {error}") from None
-        for other in sorted(used - set(left)):
-            hint = (
-                "is tied itself" if other in ties else f"is no parameter{did_you_mean(other, left)}"
-            )
-            raise ParameterError(f"{name}: {{tie: {text}}}: '{other}' {hint}")
     source = model if model.definition else load_model(_FORMULAS.get(model.name, model.name))
     if not source.definition:
         raise ParameterError(
             f"model '{model.name}' is not declared by formulas: its parameters cannot be tied"
         )
-    data = from_text(source.definition).data()
+    data, name = from_text(source.definition).data(), _named(model.name, ties)
+    parameters = {**data["parameters"], **{name: {_TIE: text} for name, text in ties.items()}}
     try:
-        return built(describe(_substituted(data, ties) | {"name": _named(model.name, ties)}))
+        return from_data({**data, "name": name, "parameters": parameters})
     except ModelError as error:
-        raise ParameterError(f"{_named(model.name, ties)}: {error}") from None
+        raise ParameterError(f"{name}: {error}") from None
 
 
 def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
@@ -111,44 +102,27 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
         If a tie is not an expression of other parameters.
     """
     from contfric.errors import ModelError
-    from contfric.models.entries import EntryError, constraints_in
+    from contfric.models.entries import EntryError
     from contfric.models.grammar import names_in, parse
 
-    given = data.get("parameters")
-    parameters = given if isinstance(given, Mapping) else {}
-    ties = {
-        str(name): str(value[_TIE])
-        for name, value in parameters.items()
-        if isinstance(value, Mapping) and _TIE in value
-    }
+    parameters = data["parameters"]
+    ties = {name: entry[_TIE] for name, entry in parameters.items() if _TIE in entry}
     if not ties:
         return data
-    left = [str(name) for name in parameters if name not in ties]
+    left = [name for name in parameters if name not in ties]
     for name, text in ties.items():
         try:
             foreign = sorted(names_in(parse(text)) - {"pi", *left})
         except ModelError as error:
             raise EntryError(("parameters", name), str(error)) from None
         if foreign:
-            hint = did_you_mean(foreign[0], left)
+            other = foreign[0]
+            why = f"is no parameter{did_you_mean(other, left)}"
             raise EntryError(
                 ("parameters", name),
-                f"a tie is an expression of other parameters, and there is no '{foreign[0]}'{hint}",
+                f"{{tie: {text}}}: '{other}' {'is tied itself' if other in ties else why}",
             )
-    whole: dict[str, Any] = {
-        "define": {},
-        "observables": {},
-        "spread": {},
-        "surfaces": {},
-        "modes": {},
-        "resets": {},
-    }
-    plain = {
-        **whole,
-        **{k: v for k, v in data.items() if v is not None},
-        "constraints": constraints_in(data),
-    }
-    return _substituted(plain, ties)
+    return _substituted(data, ties)
 
 
 def _named(name: str, ties: Mapping[str, str]) -> str:
@@ -157,8 +131,6 @@ def _named(name: str, ties: Mapping[str, str]) -> str:
 
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:
     """Return a model's data with expressions in the place of parameters."""
-    from contfric.models.rewriting import OF_MODES, OTHERS, SHARED, rewritten
-
     put = Substitution(ties)
     found = rewritten(data, (*SHARED, *OF_MODES, *OTHERS), lambda text, _: put.text(text))
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
@@ -180,11 +152,8 @@ class Substitution(ast.NodeTransformer):
 
     def text(self, text: str) -> str:
         """Return an expression with the ties put in."""
-        try:
-            tree = ast.parse(str(text).strip(), mode="eval")
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            return text  # whoever reads it says what is wrong
-        return ast.unparse(self.visit(tree))
+        tree = tree_of(str(text))
+        return text if tree is None else ast.unparse(self.visit(tree))
 
     def condition(self, text: str) -> str:
         """Return an inequality with the ties put in, as it stood if none is in it."""

@@ -13,15 +13,15 @@ that the file declares stay as they are. Observables are divided by a power of t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.clocks import is_clock
 from contfric.models.description import Description
-from contfric.models.entries import EntryError, Part, mapping_in
+from contfric.models.entries import EntryError, known_keys
 from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.grammar import TIME, number_of
+from contfric.models.grammar import TIME
 from contfric.models.tied import Substitution
 
 KEY = "units"
@@ -31,28 +31,6 @@ APPLIED = "in_units"
 _SAMPLES = 50
 
 Read = Callable[[dict[str, Any]], Description]
-
-
-def read_units(top: Part, key: str, states: Sequence[str]) -> dict[str, float]:
-    """Return the units of states and time that are given.
-
-    Raises
-    ------
-    EntryError
-        If one is no positive number, or of what is no state.
-    """
-    part = top.part(key, "a mapping of states and t to numbers, such as {x: 1.0e-3, t: 0.01}")
-    part.only((*states, TIME))
-    found = {}
-    for name, value in part.data.items():
-        try:
-            number = math.nan if isinstance(value, bool) else number_of(str(value), {})
-        except ModelError:
-            number = math.nan
-        if not 1e-100 < number < 1e100:
-            part.fail(name, f"the unit of '{name}' is a positive number, got {value!r}")
-        found[name] = number
-    return found
 
 
 def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
@@ -68,17 +46,18 @@ def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
     EntryError
         If a unit is wrong, or an angle has one.
     """
-    units = read_units(Part(data), KEY, [str(s) for s in data["states"]])
+    units, plain = data.get(KEY), {key: value for key, value in data.items() if key != KEY}
     if not units:
-        return {key: value for key, value in data.items() if key != KEY}
-    for angle in Part(data).texts("angles"):
+        return plain
+    known_keys(units, (*data["states"], TIME), (KEY,))
+    for angle in data["angles"]:
         if units.get(angle, 1.0) != 1.0:
             raise EntryError(
                 (KEY, angle), f"'{angle}' is an angle: a turn of it is 2 pi, in radians"
             )
-    clocks = filter(is_clock, map(str, data["states"]))  # times since the last ticks
-    units |= dict.fromkeys(clocks, units.get(TIME, 1.0))
-    found = _states_in_units(data, units)
+    clocks = filter(is_clock, data["states"])  # times since the last ticks
+    units = units | dict.fromkeys(clocks, units.get(TIME, 1.0))
+    found = _states_in_units(plain, units)
     return _observables_in_units(found, _sizes(read(found))) | {APPLIED: units}
 
 
@@ -86,7 +65,7 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
     time = units.get(TIME, 1.0)
     states = {name: unit for name, unit in units.items() if name != TIME}
     put = Substitution({n: f"({u!r}*{n})" for n, u in states.items() if u != 1.0})
-    rates = {s: f"{time / states.get(s, 1.0)!r}" for s in map(str, data["states"])}
+    rates = {s: f"{time / states.get(s, 1.0)!r}" for s in data["states"]}
     clock = Substitution({TIME: f"({time!r}*{TIME})"} if time != 1.0 else {})
 
     def text(expression: Any) -> str:
@@ -98,11 +77,9 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
     def over(expression: Any, unit: float) -> Any:
         return expression if unit == 1.0 else f"({expression})/{unit!r}"
 
-    found = {key: value for key, value in data.items() if key != KEY}
+    found = dict(data)
     for key in ("define", "observables"):
-        if key in data:
-            given = mapping_in(data, key)
-            found[key] = {n: f if n in data["states"] else text(f) for n, f in given.items()}
+        found[key] = {n: f if n in data["states"] else text(f) for n, f in data[key].items()}
     if "field" in data:
         found["field"] = field(data["field"])
     found["modes"] = {
@@ -110,41 +87,30 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
         for name, mode in data["modes"].items()
     }
     found["surfaces"] = {
-        name: {**s, "level": over(s.get("level", 0), states.get(str(s.get("observable")), 1.0))}
+        name: {**s, "level": over(s["level"], states.get(s["observable"], 1.0))}
         for name, s in data["surfaces"].items()
     }
-    if "resets" in data:
-        found["resets"] = {
-            name: {
-                k: v if k in ("to", "from") else over(text(v), states.get(k, 1.0))
-                for k, v in reset.items()
-            }
-            for name, reset in data["resets"].items()
+    found["resets"] = {
+        name: {
+            k: v if k in ("to", "from") else over(text(v), states.get(k, 1.0))
+            for k, v in reset.items()
         }
-    if data.get("spread"):
-        found["spread"] = {
-            s: [over(end, states.get(s, 1.0)) for end in w]
-            if isinstance(w, (list, tuple))
-            else over(w, states.get(s, 1.0))
-            for s, w in data["spread"].items()
-        }
-    if data.get("period") is not None:
-        found["period"] = over(data["period"], time)
-    if isinstance(data.get("symmetry"), (str, Mapping)):
-        found["symmetry"] = _symmetry(data["symmetry"], states, put)
-    return found | _measured(data, text, time, str(data["states"][0]), states)
-
-
-def _symmetry(
-    symmetry: str | Mapping[str, Any], states: Mapping[str, float], put: Substitution
-) -> dict[str, str]:
-    if isinstance(symmetry, str):
-        pairs = [piece.partition("->") for piece in symmetry.split(",")]
-        symmetry = {name.strip(): image.strip() for name, _, image in pairs}
-    return {
-        name: str(image) if name == TIME else f"({put.text(str(image))})/{states.get(name, 1.0)!r}"
-        for name, image in symmetry.items()
+        for name, reset in data["resets"].items()
     }
+    found["spread"] = {
+        s: [over(end, states.get(s, 1.0)) for end in w]
+        if isinstance(w, list)
+        else over(w, states.get(s, 1.0))
+        for s, w in data["spread"].items()
+    }
+    if "period" in data:
+        found["period"] = over(data["period"], time)
+    if "symmetry" in data:
+        found["symmetry"] = {
+            n: image if n == TIME else f"({put.text(image)})/{states.get(n, 1.0)!r}"
+            for n, image in data["symmetry"].items()
+        }
+    return found | _measured(data, text, time, data["states"][0], states)
 
 
 def _measured(
@@ -155,27 +121,24 @@ def _measured(
     states: Mapping[str, float],
 ) -> dict[str, Any]:
     """Return quantities, and the laws of contacts, in the units of the file."""
-    found: dict[str, Any] = {}
     bundled = {"period": time, "x_max": states.get(first, 1.0), "x_min": states.get(first, 1.0)}
     outside = Substitution({n: f"({u!r}*{n})" for n, u in bundled.items() if u != 1.0})
-    if "quantities" in data:
-        found["quantities"] = {
-            name: outside.text(text(q)).replace("integral(", f"{time!r}*integral(")
-            for name, q in data["quantities"].items()
+    quantities = {
+        name: outside.text(text(q)).replace("integral(", f"{time!r}*integral(")
+        for name, q in data["quantities"].items()
+    }
+    forces = {
+        name: {
+            **law,
+            "texts": {
+                k: f"{time!r}*({text(v)})" if k.startswith("power") else text(v)
+                for k, v in law["texts"].items()
+            },
+            **({"rest": text(law["rest"])} if "rest" in law else {}),
         }
-    if "forces" in data:
-        found["forces"] = {
-            name: {
-                **law,
-                "texts": {
-                    k: f"{time!r}*({text(v)})" if k.startswith("power") else text(v)
-                    for k, v in law["texts"].items()
-                },
-                **({"rest": text(law["rest"])} if "rest" in law else {}),
-            }
-            for name, law in data["forces"].items()
-        }
-    return found
+        for name, law in data["forces"].items()
+    }
+    return {"quantities": quantities, "forces": forces}
 
 
 def _sizes(found: Description) -> dict[str, float]:
@@ -217,17 +180,16 @@ def _observables_in_units(data: dict[str, Any], sizes: Mapping[str, float]) -> d
         name: {**mode, "field": within(mode["field"])} if "field" in mode else mode
         for name, mode in data["modes"].items()
     }
-    if "forces" in data:
-        found["forces"] = {
-            name: {**law, "texts": within(law["texts"])} for name, law in data["forces"].items()
-        }
+    found["forces"] = {
+        name: {**law, "texts": within(law["texts"])} for name, law in data["forces"].items()
+    }
     found["observables"] = {
-        name: f"({put.text(str(formula))})/{sizes[name]!r}" if name in sizes else put.text(formula)
-        for name, formula in mapping_in(data, "observables").items()
+        name: f"({put.text(formula)})/{sizes[name]!r}" if name in sizes else put.text(formula)
+        for name, formula in data["observables"].items()
     }
     found["surfaces"] = {
         name: {**s, "level": f"({s['level']})/{sizes[s['observable']]!r}"}
-        if s.get("observable") in sizes
+        if s["observable"] in sizes
         else s
         for name, s in data["surfaces"].items()
     }

@@ -12,9 +12,8 @@ import yaml
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric.models.describe import describe
 from contfric.models.entries import EntryError
-from contfric.models.files import built
+from contfric.models.files import from_data
 
 #: Two blocks on one belt, coupled by a spring: each switch drives its own block only.
 BLOCKS = """
@@ -50,7 +49,7 @@ STACK = (
 
 
 def typed(text: str) -> cf.Model:
-    return built(describe(yaml.safe_load(text.replace(" + q*sign(u - vb)*sign(w - vb)", ""))))
+    return from_data(yaml.safe_load(text.replace(" + q*sign(u - vb)*sign(w - vb)", "")))
 
 
 def steep(p: dict[str, float], name: str, eps: float):
@@ -165,7 +164,7 @@ def test_what_is_not_determined_is_refused(old: str, new: str, says: str) -> Non
     assert old in BLOCKS
     text = BLOCKS.replace(old, new)
     with pytest.raises(EntryError, match=says) as error:
-        built(describe(yaml.safe_load(text)))
+        from_data(yaml.safe_load(text))
     assert error.value.address[:2] == ("surfaces", "a")
 
 
@@ -177,4 +176,4 @@ def test_a_third_surface_that_slides_is_refused() -> None:
         text = text.replace(f"  {mode}: {{in: {{", f"  {mode}: {{in: {{c: '-', ")
     text += "  far: {in: {c: '+'}, field: {x: -1, u: 0, y: 0, w: 0}}\n"
     with pytest.raises(EntryError, match="where no others slide"):
-        built(describe(yaml.safe_load(text)))
+        from_data(yaml.safe_load(text))

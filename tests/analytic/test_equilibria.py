@@ -10,12 +10,11 @@ import yaml
 from scipy.optimize import brentq, fsolve
 
 import contfric as cf
-from contfric.models.describe import describe
-from contfric.models.files import built
+from contfric.models.files import from_data
 
 
 def typed(text: str) -> cf.Model:
-    return built(describe({"autonomous": True, **yaml.safe_load(text)}))
+    return from_data({"autonomous": True, **yaml.safe_load(text)})
 
 
 BLOCK = """

@@ -9,13 +9,12 @@ import pytest
 import yaml
 
 import contfric as cf
-from contfric.models.describe import describe
-from contfric.models.files import built
+from contfric.models.files import from_data
 from contfric.models.two_folds import TwoFoldKind
 
 
 def typed(text: str) -> cf.Model:
-    return built(describe(yaml.safe_load(text)))
+    return from_data(yaml.safe_load(text))
 
 
 def normal_form(up: int, down: int, extra: str = "") -> cf.Model:

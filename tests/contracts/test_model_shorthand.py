@@ -12,9 +12,9 @@ import yaml
 
 import contfric as cf
 from contfric.base.resources import bundled_dir
-from contfric.models.describe import describe, from_text
+from contfric.models.describe import describe
 from contfric.models.entries import EntryError
-from contfric.models.files import built
+from contfric.models.files import from_data, model_of
 from contfric.results import save
 
 
@@ -101,15 +101,15 @@ def test_mistakes_are_told_in_their_place(
     name: str, path: str, value: object, at: str, says: str
 ) -> None:
     with pytest.raises(EntryError) as caught:
-        built(describe(changed(name, path, value)))
+        from_data(changed(name, path, value))
     assert says in str(caught.value), str(caught.value)
     assert (caught.value.address[:1] or ("",))[0] == at
 
 
 def test_percent_and_T_are_the_same_clock() -> None:
-    typed = built(describe(changed("buck", "define/ramp", RAMP.format("mod(t, Ts)"))))
+    typed = from_data(changed("buck", "define/ramp", RAMP.format("mod(t, Ts)")))
     for text in ("(t % Ts)", "mod(t, T)", "mod(t, 1.0*Ts)"):
-        other = built(describe(changed("buck", "define/ramp", RAMP.format(text))))
+        other = from_data(changed("buck", "define/ramp", RAMP.format(text)))
         assert other.states == typed.states == ("v", "i", "clock")
         a, b = (cf.find_orbit(m) for m in (typed, other))
         assert np.allclose(a.joints, b.joints, rtol=1e-12, atol=1e-15)
@@ -118,14 +118,14 @@ def test_percent_and_T_are_the_same_clock() -> None:
 @pytest.mark.parametrize("text", ["sin(2*pi*t/Ts)", "cos(t*6*pi/Ts)", "abs(sin(pi*t/Ts))", "0*t"])
 def test_time_outside_of_a_clock_that_begins_again_with_it(text: str) -> None:
     """It is the same with the time since the last tick."""
-    model = built(describe(changed("buck", "modes/on/field/i", f"(E + {text} - v)/L")))
+    model = from_data(changed("buck", "modes/on/field/i", f"(E + {text} - v)/L"))
     assert model.states == ("v", "i", "clock")
 
 
 @pytest.mark.parametrize("name", ["buck", "pendulum", "relay-sliding", "relay", "rimless-wheel"])
 def test_what_is_stored_is_the_same_model(name: str, tmp_path: Path) -> None:
     model = cf.load_model(name)
-    again = built(from_text(model.definition))
+    again = model_of(model.definition)
     assert again.targets == model.targets and again.definition == model.definition
     orbit = cf.find_orbit(model)
     save(orbit, tmp_path / "orbit.npz")
@@ -162,12 +162,16 @@ def test_a_model_ties_its_own_parameters() -> None:
     given = {
         k: float(v["default"] if isinstance(v, dict) else v) for k, v in data["parameters"].items()
     }
-    own = built(describe({**data, "parameters": {**given, "S0": {"tie": "1.2*S"}}}))
+    own = from_data({**data, "parameters": {**given, "S0": {"tie": "1.2*S"}}})
     asked = cf.find_orbit("coulomb", {"Omega": 0.47, "S": 0.3, "S0": {"tie": "1.2*S"}})
     orbit = cf.find_orbit(own, {"Omega": 0.47, "S": 0.3})
     assert own.parameter_names == asked.model.parameter_names
     assert np.allclose(orbit.joints, asked.joints, rtol=0, atol=1e-13)
-    for text, says in (("Q", "there is no 'Q'"), ("S0", "there is no 'S0'"), ("S*", "cannot read")):
+    for text, says in (
+        ("Q", "'Q' is no parameter"),
+        ("S0", "is tied itself"),
+        ("S*", "cannot read"),
+    ):
         with pytest.raises(EntryError) as caught:
             describe({**data, "parameters": {**given, "S0": {"tie": text}}})
         assert says in str(caught.value) and caught.value.address == ("parameters", "S0")
@@ -248,11 +252,11 @@ def test_motion_that_could_go_on_in_two_modes_is_refused() -> None:
         },
     }
     with pytest.raises(EntryError) as caught:
-        built(describe(data))
+        from_data(data)
     assert "down or fast" in str(caught.value) and caught.value.address == ("modes", "fast", "in")
     apart = copy.deepcopy(data)
     apart["modes"]["fast"]["in"]["q"] = "-"
-    assert built(describe(apart)).targets["up:x0,y+", "hi"] == ("down:x0",)  # it turns back there
+    assert from_data(apart).targets["up:x0,y+", "hi"] == ("down:x0",)  # it turns back there
 
 
 def test_names_of_modes_with_signs_have_sliding_between_them(tmp_path: Path) -> None:

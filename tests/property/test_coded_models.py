@@ -15,7 +15,7 @@ from contfric.models.build import load_module
 from contfric.models.coded import Forms, forms_of
 from contfric.models.coded_flow import CodedFlow
 from contfric.models.coefficients import AFFINE, Affine, symbols
-from contfric.models.describe import describe, from_text
+from contfric.models.describe import from_text
 from contfric.models.grammar import FLOATS, Scope, parse
 from contfric.models.not_affine import NotAffineError
 from contfric.orbit.simulation import simulate
@@ -215,9 +215,9 @@ def chain(count: int, contacts: int) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def three() -> cf.Model:
-    from contfric.models.files import built
+    from contfric.models.files import from_data
 
-    return built(describe(chain(4, 3)))
+    return from_data(chain(4, 3))
 
 
 def test_a_model_of_many_modes_is_not_compiled(three: cf.Model) -> None:
@@ -282,7 +282,7 @@ def test_too_many_surfaces_are_refused() -> None:
         "surfaces": lines,
         "modes": {"only": {"in": {}, "field": {"x": "v", "v": "-k*x"}}},
     }
-    from contfric.models.files import built
+    from contfric.models.files import from_data
 
     with pytest.raises(ModelError, match="has 70 surfaces, a simulation takes 62"):
-        simulate(built(describe(data)), {}, state=[1.0, 0.0])
+        simulate(from_data(data), {}, state=[1.0, 0.0])

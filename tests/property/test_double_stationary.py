@@ -10,25 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.models.describe import describe
-from contfric.models.files import built
+from contfric.models.files import from_data
 
 
 def model(nonlinear: bool) -> cf.Model:
     """x' = 1 - cos(t - a) + d: a double zero at t = a where d = 0, two zeros below and none above."""
     slow = "-y**3" if nonlinear else "-y"
-    return built(
-        describe(
-            {
-                "name": f"double zero {slow}",
-                "states": ["x", "y"],
-                "parameters": {"a": 2.0, "d": 0.0},
-                "period": "2*pi",
-                "observables": {"x": "x"},
-                "surfaces": {"far": {"observable": "x", "level": 1000}},
-                "modes": {"on": {"field": {"x": "1 - cos(t - a) + d + 0*y", "y": slow}}},
-            }
-        )
+    return from_data(
+        {
+            "name": f"double zero {slow}",
+            "states": ["x", "y"],
+            "parameters": {"a": 2.0, "d": 0.0},
+            "period": "2*pi",
+            "observables": {"x": "x"},
+            "surfaces": {"far": {"observable": "x", "level": 1000}},
+            "modes": {"on": {"field": {"x": "1 - cos(t - a) + d + 0*y", "y": slow}}},
+        }
     )
 
 

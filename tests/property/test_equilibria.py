@@ -12,8 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import contfric as cf
-from contfric.models.describe import describe
-from contfric.models.files import built
+from contfric.models.files import from_data
 
 
 def system(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -32,20 +31,18 @@ def model_of(a: np.ndarray, b: np.ndarray) -> cf.Model:
             rows[name] = " + ".join([*terms, f"({float(b[k, i])!r})"]) + more
         return rows
 
-    return built(
-        describe(
-            {
-                "name": "random",
-                "states": names,
-                "parameters": {"m": 0.0},
-                "autonomous": True,
-                "surfaces": {"h": {"observable": "x", "level": 0, "sliding": "filippov"}},
-                "modes": {
-                    "plus": {"in": {"h": "+"}, "field": field(0)},
-                    "minus": {"in": {"h": "-"}, "field": field(1)},
-                },
-            }
-        )
+    return from_data(
+        {
+            "name": "random",
+            "states": names,
+            "parameters": {"m": 0.0},
+            "autonomous": True,
+            "surfaces": {"h": {"observable": "x", "level": 0, "sliding": "filippov"}},
+            "modes": {
+                "plus": {"in": {"h": "+"}, "field": field(0)},
+                "minus": {"in": {"h": "-"}, "field": field(1)},
+            },
+        }
     )
 
 

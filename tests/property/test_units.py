@@ -12,8 +12,7 @@ import yaml
 import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
-from contfric.models.describe import describe
-from contfric.models.files import built, loaded
+from contfric.models.files import from_data, loaded
 
 FRICTION = """
 name: block
@@ -52,7 +51,7 @@ OTHERS = (
 
 
 def model_of(data: dict[str, Any], folder: Path) -> Model:
-    return built(describe(loaded(data, folder)))
+    return from_data(loaded(data, folder))
 
 
 def proposed(model: Model) -> dict[str, float]:
