@@ -139,8 +139,8 @@ def main() -> None:
         "mode is given: those that were visited are counted (59049 can be). Below 0.9977 the orbits of ten "
         "contacts lose their stability (NS). Last rows: masses, springs and friction drawn at random, over "
         f"{100 * WIDTH:.0f} % to either side of the lowest natural frequency. Where an end of the range is "
-        "not reached, the last column says at which value the last branch ended, and why (SHAKEDOWN: beyond it a "
-        "stuck contact slips to one side until it sticks at another position)."
+        "not reached, the last column says at which value the last branch ended, and why (SHAKEDOWN: beyond "
+        "it a stuck contact slips to one side until it sticks at another position)."
     )
     head = (
         "| contacts | load | first orbit | its segments | curve | points | events | loose ends | modes "
