@@ -13,6 +13,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from origin import origin
@@ -22,6 +23,8 @@ HEADING = "## Many friction contacts"
 MASSES, CONTACTS = 20, (1, 2, 3, 4, 6, 8, 10)
 COUPLING, DAMPING, KINETIC, OMEGA, RANGE = 0.5, 0.02, 0.03, 1.0, (0.999, 1.03)
 MAX_STEP = 0.01
+#: Share of the range within which its end is reached.
+WITHIN = 1e-9
 #: Seeds of structures with random data, and how far to either side of the lowest natural frequency.
 SEEDS, WIDTH = (0, 1, 2, 3, 4, 6), 0.03
 
@@ -60,6 +63,18 @@ def drawn(seed: int) -> Row:
     return Row(f"10, random {seed}", mass, stiffness, rubs, low, reach)
 
 
+def reached(diagram: Any) -> str:
+    """Return whether both ends of the range are reached, else where and why the last branch ended."""
+    width, found = diagram.range[1] - diagram.range[0], []
+    for side, wanted in zip((min, max), diagram.range, strict=True):
+        nearest = side(diagram.branches, key=lambda branch: side(branch.values))
+        end = nearest.ends[0 if nearest.values[0] == side(nearest.values) else 1]
+        at = float(side(nearest.values))
+        if abs(at - wanted) > WITHIN * width:
+            found.append(f"{at:.4f}: {end.reason.name}")
+    return "; ".join([*found, *([] if diagram.complete else diagram.notes)]) or "yes"
+
+
 def measure(row: Row) -> dict[str, float | str]:
     """Return seconds of each step, and counts."""
     import contfric as cf
@@ -94,6 +109,7 @@ def measure(row: Row) -> dict[str, float | str]:
         "loose": len(diagram.loose_ends),
         "modes": len(model.modes),
         "stops": len(orbit.itinerary),
+        "reached": reached(diagram),
     }
 
 
@@ -111,7 +127,7 @@ def main() -> None:
         print(found, flush=True)
         rows.append(
             "| {contacts} | {load:.2f} | {orbit:.2f} | {stops} | {curve:.2f} | {points} | {events} | "
-            "{loose} | {modes} |".format(**found)
+            "{loose} | {modes} | {reached} |".format(**found)
         )
     says = (
         f"Written by `make bench` (`benchmarks/contacts.py`): {origin()}. "
@@ -122,13 +138,15 @@ def main() -> None:
         "down, with multipliers and admissibility at every point, every event located and followed. No "
         "mode is given: those that were visited are counted (59049 can be). Below 0.9977 the orbits of ten "
         "contacts lose their stability (NS). Last rows: masses, springs and friction drawn at random, over "
-        f"{100 * WIDTH:.0f} % to either side of the lowest natural frequency."
+        f"{100 * WIDTH:.0f} % to either side of the lowest natural frequency. Where an end of the range is "
+        "not reached, the last column says at which value the last branch ended, and why (SHAKEDOWN: beyond "
+        "it a stuck contact slips to one side until it sticks at another position)."
     )
     head = (
         "| contacts | load | first orbit | its segments | curve | points | events | loose ends | modes "
-        "visited |"
+        "visited | range reached |"
     )
-    text = "\n".join([HEADING, "", says, "", head, "|---" * 9 + "|", *rows])
+    text = "\n".join([HEADING, "", says, "", head, "|---" * 10 + "|", *rows])
     page = PAGE.read_text(encoding="utf-8").partition(HEADING)[0].rstrip()
     PAGE.write_text(f"{page}\n\n{text}\n", encoding="utf-8")
 

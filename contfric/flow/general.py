@@ -88,6 +88,29 @@ def either_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: i
     return stepped_stationary(motion, mode, c, t0, y0, dt, p, times, values)
 
 
+@allocating_helper
+def through_projection(jac, start, n):  # type: ignore[no-untyped-def]
+    """Multiply the derivatives of a flow by those of the projection before it.
+
+    A projection leaves most states as they are: the rows of these are those of the identity.
+    """
+    row, kept = np.empty(n), np.empty(n)
+    for k in range(n):
+        others = 0.0
+        for j in range(start.shape[1]):
+            others += abs(start[k, j])
+        kept[k] = 1.0 if others == 1.0 and start[k, 1 + k] == 1.0 else 0.0
+    for i in range(n):
+        for k in range(n):
+            row[k] = jac[i, 1 + k]
+            jac[i, 1 + k] = row[k] if kept[k] != 0.0 else 0.0
+        for k in range(n):
+            if kept[k] != 0.0:
+                continue
+            for j in range(start.shape[1]):  # the column of the duration is between these
+                jac[i, j if j <= n else j + 1] += row[k] * start[k, j]
+
+
 def flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     """Advance a state by ``dt``, with derivatives where ``jac`` has space (``flow_signature``)."""
     if motion.slides[mode] == 0:
@@ -97,16 +120,8 @@ def flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untype
     held, start = np.empty(n), np.empty((rows, jac.shape[1] - 1 if rows > 0 else 0))
     motion.onto(mode, t0, y0, p, which, held, start)
     motion.moved(motion, mode, t0, held, dt, p, which, y1, jac)
-    for i in range(rows):
-        row = jac[i, 1 : 1 + n].copy()
-        for j in range(1 + n):
-            by = jac[i, 0] if j == 0 else 0.0
-            for k in range(n):
-                by += row[k] * start[k, j]
-            jac[i, j] = by
-        for j in range(which.shape[0]):
-            for k in range(n):
-                jac[i, 2 + n + j] += row[k] * start[k, 1 + n + j]
+    if rows > 0:
+        through_projection(jac, start, n)
 
 
 def hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ignore[no-untyped-def]

@@ -99,6 +99,35 @@ def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:
     assert checked == 36 + 2
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives_of_a_slide_are_those_of_its_values_beside_its_surfaces(seed: int) -> None:
+    model, _ = random_structure(seed)
+    draw, every = np.random.default_rng(seed), np.arange(len(model.parameter_names))
+    n, slides = (
+        len(model.states),
+        [name for name in model.mode_by_name if "s" in name[:2]],
+    )
+    assert slides
+    for name in draw.choice(slides, min(len(slides), 6), replace=False):
+        m, p = model.mode_index[str(name)], model.vector({}) * draw.uniform(0.9, 1.1, len(every))
+        x = np.array([draw.uniform(0.0, 3.0), *draw.normal(size=n), draw.uniform(0.2, 2.0), *p])
+        end, jac = np.empty(n), np.empty((n, 2 + n + len(every)))
+        model.flow.flow(m, x[0], x[1 : 1 + n].copy(), x[1 + n], p, every, end, jac)
+        for j in range(len(x)):
+            h = 1e-5 * max(1.0, abs(x[j]))
+            ends = [_moved(model, m, x + side * h * np.eye(len(x))[j]) for side in (1.0, -1.0)]
+            slope = (ends[0] - ends[1]) / (2.0 * h)
+            assert np.max(np.abs(slope - jac[:, j])) <= 1e-6 * (1.0 + np.max(np.abs(jac[:, j])))
+
+
+def _moved(model: cf.Model, m: int, x: np.ndarray) -> np.ndarray:
+    """Return the end of a solution from its start, duration and parameters, in one vector."""
+    n = len(model.states)
+    end, none, nothing = np.empty(n), np.empty(0, dtype=np.int64), np.empty((0, 0))
+    model.flow.flow(m, x[0], x[1 : 1 + n].copy(), x[1 + n], x[2 + n :].copy(), none, end, nothing)
+    return end
+
+
 def test_one_mass_is_the_oscillator_of_the_article() -> None:
     contacts = {"brake": {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"}}
     model = cf.Mechanism(

@@ -104,12 +104,14 @@ def expand(model, piece, co, y, c, s, w, h, terms, series):  # type: ignore[no-u
             series[m, i] = 0.0
     add_waves(model, row, n, shift, co, c, s, w, h, terms, series)
     for m in range(terms):
-        f = h / (m + 1.0)
+        f, y_m, y_next, begin = h / (m + 1.0), series[m], series[m + 1], first
         for i in range(n):
-            total = 0.0
-            for k in range(model.slope_at[row + i], model.slope_at[row + i + 1]):
-                total += co[k - first] * series[m, model.columns[k]]
-            series[m + 1, i] += f * total
+            total, end = 0.0, model.slope_at[row + i + 1]
+            for k in range(begin, end):
+                # a whole number without a sign: else a place counted from the end is asked for first
+                total += co[np.uint64(k - first)] * y_m[np.uint64(model.columns[k])]
+            y_next[i] += f * total
+            begin = end
 
 
 def carry(model, piece, co, h, terms, columns):  # type: ignore[no-untyped-def]
@@ -160,13 +162,14 @@ def vary(model, piece, co, by, z, waves, w, dw, h, terms, series, out):  # type:
             out[m, i] = 0.0
     add_varied_waves(model, row, n, shift, co, by, waves, w, dw, h, terms, out)
     for m in range(terms):
-        f = h / (m + 1.0)
+        f, y_m, z_m, z_next, begin = h / (m + 1.0), series[m], out[m], out[m + 1], first
         for i in range(n):
-            total = 0.0
-            for k in range(model.slope_at[row + i], model.slope_at[row + i + 1]):
-                j = model.columns[k]
-                total += co[k - first] * out[m, j] + by[k - first] * series[m, j]
-            out[m + 1, i] += f * total
+            total, end = 0.0, model.slope_at[row + i + 1]
+            for k in range(begin, end):
+                j, q = np.uint64(model.columns[k]), np.uint64(k - first)
+                total += co[q] * z_m[j] + by[q] * y_m[j]
+            z_next[i] += f * total
+            begin = end
 
 
 def sums(model, piece, co, d, row, column, own):  # type: ignore[no-untyped-def]

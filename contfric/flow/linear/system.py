@@ -216,7 +216,8 @@ def start_waves(system, t):  # type: ignore[no-untyped-def]
 def sum_of(series, terms, out):  # type: ignore[no-untyped-def]
     """Write the sum of a series, its smallest terms first."""
     for i in range(out.shape[0]):
-        total = 0.0
-        for k in range(terms, -1, -1):
-            total += series[k, i]
-        out[i] = total
+        out[i] = series[terms, i]
+    for k in range(terms - 1, -1, -1):
+        row = series[k]
+        for i in range(out.shape[0]):  # neighbours in memory are added together
+            out[i] += row[i]
