@@ -110,7 +110,7 @@ def continue_quantity(
     function_of("progress", progress)
     start = _start(orbit, held_quantity, value, box, progress)
     held = Held(start, held_quantity, value, box)
-    first = held.first()
+    first = None if held.still() else held.first()
     if first is None:
         raise ConvergenceError(
             f"the orbits with {quantity} = {value:g} have no unique direction at the start: it may not "

@@ -107,8 +107,8 @@ class Fit(Tabled):
         if not chdtrc(spare, self.chi_square) >= _UNLIKELY:
             found.append(
                 f"the fit misses its data: chi^2 = {self.chi_square:.4g} where about {spare} is expected; "
-                "the standard deviations of the parameters do not hold (a wrong model, data of another branch, "
-                "another minimum, or a sigma that is too small)"
+                "the standard deviations of the parameters do not hold (a wrong model, data of another "
+                "branch, another minimum, or a sigma that is too small)"
             )
         return tuple(found)
 
