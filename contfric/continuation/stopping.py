@@ -23,7 +23,7 @@ from contfric.continuation.side import Side
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
-from contfric.quantities.registry import Quantity, number_quantity
+from contfric.quantities.registry import Quantity, quantity_of
 
 #: A start whose quantity is this near to the value (relative to 1 + its size) is at it, and leaves it.
 _AT_VALUE = 1e-9
@@ -126,7 +126,7 @@ def stop_among(orbit: Orbit, side: Side, settings: Settings, fresh: int, last: i
 
 def _all_sought(orbit: Orbit, settings: Settings) -> Iterator[_Sought]:
     for name, value in settings.stop_at:
-        quantity = number_quantity(name, orbit.model, "stop_at")
+        quantity = quantity_of(name, orbit.model)
         yield _Sought(orbit, settings, quantity, value)
         if settings.up_to_mirror and orbit.model.symmetry and not orbit.system.half:
             yield _Sought(orbit, settings, quantity, value, mirrored=True)
