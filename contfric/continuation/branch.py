@@ -367,8 +367,7 @@ class Branch(Shown):
         if self.model.autonomous:
             columns["period"] = self.period
         columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
-        columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
-        columns |= more
+        columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)} | more
         if self.stable is not None:
             columns["stable"] = self.stable
         return as_table(columns)

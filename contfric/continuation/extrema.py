@@ -180,6 +180,8 @@ def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
         if j != i + 1:
             continue  # no tangent at the point between them: an event
         step = _Step(before, after, measured[k], measured[k + 1])
+        if not np.isfinite([step.first.value, step.last.value]).all():
+            continue  # it is not defined all along
         if _flat_end(slopes[k : k + 4]):
             continue
         steep = max(abs(float(m.ahead[0])) for m in (step.first, step.last))

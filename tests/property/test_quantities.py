@@ -242,3 +242,32 @@ def test_a_function_is_refused_where_files_keep_the_question() -> None:
         cf.ParameterError, match=r"takes a list of quantities, such as \['energy'\]"
     ):
         branch.to_dataframe("energy")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_jumps_and_poles_of_a_quantity_are_no_values_of_it(seed: int) -> None:
+    """A branch stops where the quantity has the value, and not where it passes it by infinity or a jump."""
+    rng = np.random.default_rng(seed)
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    plain = cf.continue_orbit(orbit, "Omega", (0.48, 0.53))
+    low, high = float(plain.x_max.min()), float(plain.x_max.max())
+    at, value = low + rng.uniform(0.2, 0.5) * (high - low), rng.uniform(0.5, 3.0)
+    far = 5.0 * value / (high - low)  # taken beyond the pole, some steps away from it
+    for text, wanted, taken in [
+        (f"1/(x_max - {at!r})", 0.01 * value, False),
+        (f"where(x_max > {at!r}, 2, 1)", 1.5, False),
+        (f"sign(x_max - {at!r})", 0.3, False),
+        (f"1/(x_max - {at!r})", far, True),
+        (f"log(x_max - {at!r})", float(np.log(0.3 * (high - at))), True),
+        (f"sqrt({low - 1.0!r} - x_max)", 1.0, False),
+    ]:
+        branch = cf.continue_orbit(orbit, "Omega", (0.48, 0.53), stop_at={text: wanted})
+        stopped = [i for i, e in zip((0, -1), branch.ends, strict=True) if e.reason.name == "STOP"]
+        assert bool(stopped) == taken, text
+        for i in stopped:
+            assert branch[i].quantity(text) == pytest.approx(wanted, rel=1e-8)
+        assert all(np.isfinite(e.value) for e in plain.extrema(text))
+        if not taken:
+            ranges = {"Omega": (0.48, 0.53), "S": (0.315, 0.325)}
+            with pytest.raises(cf.ConvergenceError, match="no orbit of this signature"):
+                cf.continue_quantity(orbit, text, wanted, ("Omega", "S"), ranges)
