@@ -362,12 +362,11 @@ class Branch(Shown):
         """
         from contfric.quantities.registry import columns_asked
 
-        more = {q.name: self.quantity(q.asked) for q in columns_asked(quantities, self.model)}
-        columns: dict[str, Any] = dict(self.params)
-        if self.model.autonomous:
-            columns["period"] = self.period
+        period = {"period": self.period} if self.model.autonomous else {}
+        columns: dict[str, Any] = {**self.params, **period}
         columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
-        columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)} | more
+        columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
+        columns |= {q.name: self.quantity(q.asked) for q in columns_asked(quantities, self.model)}
         if self.stable is not None:
             columns["stable"] = self.stable
         return as_table(columns)
