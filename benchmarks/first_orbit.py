@@ -12,8 +12,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import yaml
 from origin import origin
+
+from contfric.base.yaml_lines import read_yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 BUNDLED = ROOT / "contfric" / "models" / "bundled"
@@ -43,7 +44,7 @@ def lines_of(text: str) -> int:
 
 def seconds_of(model: str) -> float:
     """Return the processor's seconds of a new process that finds the first orbit."""
-    study = yaml.safe_load((STUDIES / f"{model}.yaml").read_text(encoding="utf-8"))
+    study = read_yaml(STUDIES / f"{model}.yaml").data
     start = study.get("start")
     given = start["simulate"] if isinstance(start, dict) else {}
     code = (

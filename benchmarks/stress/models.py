@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from chunks import Chunked
 from restarts import Scene, chunk
 from scenes import generator
 
 import contfric as cf
+from contfric.base.yaml_lines import read_yaml
 from contfric.study.library import study_names, study_path
 
 WHAT = "Diagrams of models other than coulomb, explored again from up to six of their branches."
@@ -40,7 +40,7 @@ DRAWS, PERIODS = 20, 2
 @cache
 def bases(folders: tuple[Path, ...] = (MODELS,)) -> tuple[Scene, ...]:
     """Return the scenes about which others are drawn: studies, and models without a range of their own."""
-    studies = [_of_study(yaml.safe_load(study_path(name).read_text())) for name in study_names()]
+    studies = [_of_study(read_yaml(study_path(name)).data) for name in study_names()]
     files = [
         Scene(dict(cf.load_model(path).defaults), "", (0.0, 0.0), str(path))
         for folder in folders

@@ -277,13 +277,13 @@ class Diagram(Shown):
                 graph.add_edge(i - 1, i)
         return len(graph) == 0 or bool(nx.is_connected(graph))
 
-    def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
+    def to_dataframe(self, quantities: Sequence[QuantityLike] = ()) -> pd.DataFrame:
         """Return the points of all branches as one table, with the branch's number and name.
 
         Parameters
         ----------
-        quantities : sequence of str
-            More columns: quantities by name or as expressions.
+        quantities : sequence of str or callable
+            More columns: quantities by name, as expressions, or as functions of an orbit.
         """
         return stacked(
             ({"branch": i + 1, "signature": branch.name}, branch.to_dataframe(quantities))

@@ -27,7 +27,7 @@ from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.continuation.vertices import symmetrised
-from contfric.errors import ConvergenceError, function_of, truth, whole_number
+from contfric.errors import ConvergenceError, ParameterError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
@@ -96,6 +96,12 @@ def explore(
     ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points, stop_at)
+    stops = tuple((asked, value) for asked, value in settings.stop_at if isinstance(asked, str))
+    if len(stops) < len(settings.stop_at):
+        raise ParameterError(
+            "in stop_at a diagram takes quantities by name or expression: files keep what was asked for, "
+            "and no functions"
+        )
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     if copies is not None:
@@ -115,7 +121,6 @@ def explore(
         state.notes.append(
             f"max_periods raised to {orbit.periods}: the start has that many periods"
         )
-    stops = settings.stop_at
     asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
     with one_thread():
         # tables that grow as modes are visited belong to one thread

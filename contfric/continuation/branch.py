@@ -310,13 +310,13 @@ class Branch(Shown):
 
         return of_branch(quantity_of(name, self.model), self)
 
-    def extrema(self, name: str) -> tuple[Extremum, ...]:
+    def extrema(self, name: QuantityLike) -> tuple[Extremum, ...]:
         """Return the local extrema of a quantity along the branch, located, in its order.
 
         Parameters
         ----------
-        name : str
-            A quantity by its name or as an expression.
+        name : str or callable
+            A quantity by its name or as an expression, or a function of an orbit.
 
         Raises
         ------
@@ -352,21 +352,21 @@ class Branch(Shown):
 
         return certify_branch(self, latest(time_limit))
 
-    def to_dataframe(self, quantities: Sequence[str] = ()) -> pd.DataFrame:
+    def to_dataframe(self, quantities: Sequence[QuantityLike] = ()) -> pd.DataFrame:
         """Return the points as a table: parameters, x_max, x_min, psi, stops, stability (pandas).
 
         Parameters
         ----------
-        quantities : sequence of str
-            More columns: quantities by name or as expressions.
+        quantities : sequence of str or callable
+            More columns: quantities by name, as expressions, or as functions of an orbit.
         """
-        more = {name: self.quantity(name) for name in quantities}
-        columns: dict[str, Any] = dict(self.params)
-        if self.model.autonomous:
-            columns["period"] = self.period
+        from contfric.quantities.registry import columns_asked
+
+        period = {"period": self.period} if self.model.autonomous else {}
+        columns: dict[str, Any] = {**self.params, **period}
         columns |= {"x_max": self.x_max, "x_min": self.x_min, "psi": self.asymmetry}
         columns |= {f"stop_{k + 1}": x for k, x in enumerate(self.stops.T)}
-        columns |= more
+        columns |= {q.name: self.quantity(q.asked) for q in columns_asked(quantities, self.model)}
         if self.stable is not None:
             columns["stable"] = self.stable
         return as_table(columns)

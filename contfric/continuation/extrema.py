@@ -21,7 +21,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import NumberWithGradient, differentiated
-from contfric.quantities.registry import Quantity, number_quantity
+from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
@@ -167,9 +167,9 @@ def _nearest(slopes: FloatArray) -> Iterator[float]:
             yield x
 
 
-def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
+def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
     """Return the extrema of a quantity along a branch; see :meth:`contfric.Branch.extrema`."""
-    quantity = number_quantity(name, branch.model, "extrema")
+    quantity = number_quantity(name, branch.model, "extrema", True)
     search = _ExtremumSearch(branch, quantity, _settings(branch))
     found: list[Extremum] = []
     points = list(_points(branch, search))
@@ -180,6 +180,8 @@ def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
         if j != i + 1:
             continue  # no tangent at the point between them: an event
         step = _Step(before, after, measured[k], measured[k + 1])
+        if not np.isfinite([step.first.value, step.last.value]).all():
+            continue  # it is not defined all along
         if _flat_end(slopes[k : k + 4]):
             continue
         steep = max(abs(float(m.ahead[0])) for m in (step.first, step.last))
@@ -193,7 +195,9 @@ def extrema_of(branch: Branch, name: str) -> tuple[Extremum, ...]:
             value = differentiated(quantity, orbit, None).value
             position = float(branch.arc[i] + share * (branch.arc[j] - branch.arc[i]))
             kink = slope > _KINK * steep
-            found.append(Extremum(name, largest, value, orbit.params, orbit, position, kink))
+            found.append(
+                Extremum(quantity.name, largest, value, orbit.params, orbit, position, kink)
+            )
     return tuple(found)
 
 

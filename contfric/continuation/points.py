@@ -29,6 +29,7 @@ from contfric.quantities.registry import number_quantity
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
     from contfric.continuation.geometry import Points
+    from contfric.quantities.registry import QuantityLike
 
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
 #: size of the state): about 100 points over the range.
@@ -84,7 +85,7 @@ class Settings:
     stability: bool = True
     most_points: int = MOST_POINTS
     copies: int = 1
-    stop_at: tuple[tuple[str, float], ...] = ()
+    stop_at: tuple[tuple[QuantityLike, float], ...] = ()
     up_to_mirror: bool = False
 
     @property
@@ -278,7 +279,7 @@ def settings_of(
     max_step: float | None,
     stability: bool,
     max_points: int,
-    stop_at: Mapping[str, float] | None = None,
+    stop_at: Mapping[Any, float] | None = None,
 ) -> Settings:
     """Check what the user asked for and clip the range to the model's limits.
 
@@ -340,12 +341,14 @@ def settings_of(
     )
 
 
-def _stops(model: Model, stop_at: object) -> tuple[tuple[str, float], ...]:
+def _stops(model: Model, stop_at: object) -> tuple[tuple[QuantityLike, float], ...]:
     """Return the quantities to stop at with their values, checked."""
     if stop_at is None:
         return ()
     given = mapping_of("stop_at", stop_at, "{'x_max': 1.4}")
     return tuple(
-        (number_quantity(name, model, "stop_at").name, real_number(f"stop_at['{name}']", value))
-        for name, value in given.items()
+        (found.asked, real_number(f"stop_at['{found.name}']", value))
+        for found, value in (
+            (number_quantity(name, model, "stop_at", True), value) for name, value in given.items()
+        )
     )

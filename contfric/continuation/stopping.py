@@ -23,10 +23,13 @@ from contfric.continuation.side import Side
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions
-from contfric.quantities.registry import Quantity, number_quantity
+from contfric.quantities.registry import Quantity, quantity_of
 
 #: A start whose quantity is this near to the value (relative to 1 + its size) is at it, and leaves it.
 _AT_VALUE = 1e-9
+#: A quantity that jumps past the value, or passes it by a pole, changes its sign there too, and Brent's
+#: method ends there. It does not come nearer to the value than this share of the nearer end of the bracket.
+_LEAST = 0.1
 #: How near to the value the cubic has to come, as a share of the nearer end of a step, to be looked at.
 _NEAR = 0.1
 
@@ -80,7 +83,7 @@ class _Sought:
         return found.mirror() if self.mirrored else found
 
     def crossing(self, before: Point, after: Point) -> Stop | None:
-        """Return the location between two points on both sides of the value."""
+        """Return the location between two points on both sides of the value; None at a jump or pole."""
         last = before
 
         def miss_at(point: Point) -> float:
@@ -93,6 +96,9 @@ class _Sought:
         if point is None:
             lies = f"{reached} lies beyond this point, and Newton fails on the way"
             return Stop(last, End(EndReason.STOP, lies))
+        found, ends = abs(self.miss(point)), (abs(self.miss(before)), abs(self.miss(after)))
+        if not (found <= _AT_VALUE * (1.0 + abs(self.value)) or found < _LEAST * min(ends)):
+            return None
         return Stop(point, End(EndReason.STOP, f"{EndReason.STOP.value}: {reached}"))
 
 
@@ -126,7 +132,7 @@ def stop_among(orbit: Orbit, side: Side, settings: Settings, fresh: int, last: i
 
 def _all_sought(orbit: Orbit, settings: Settings) -> Iterator[_Sought]:
     for name, value in settings.stop_at:
-        quantity = number_quantity(name, orbit.model, "stop_at")
+        quantity = quantity_of(name, orbit.model)
         yield _Sought(orbit, settings, quantity, value)
         if settings.up_to_mirror and orbit.model.symmetry and not orbit.system.half:
             yield _Sought(orbit, settings, quantity, value, mirrored=True)
@@ -177,7 +183,7 @@ def _dip(a: float, b: float, before: Point, after: Point, sought: _Sought) -> fl
     if sign * p >= 0.0:
         return None
     q = length * sought.slope(after)
-    if sign * q <= 0.0:
+    if sign * q <= 0.0 or not np.isfinite([a, b, p, q]).all():
         return None
     cubic = np.polynomial.Polynomial([a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q])
     roots = np.asarray(cubic.deriv().roots(), dtype=np.complex128)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def continue_orbit(
     max_step: float | None = None,
     stability: bool = True,
     max_points: int = MOST_POINTS,
-    stop_at: Mapping[str, float] | None = None,
+    stop_at: Mapping[Any, float] | None = None,
     progress: Progress | None = None,
 ) -> Branch:
     """Continue an orbit in one parameter, in both directions, to the ends of its branch.
@@ -81,8 +82,9 @@ def continue_orbit(
     max_points : int
         Largest number of points of each half-branch; a branch that reaches it says so.
     stop_at : mapping, optional
-        Quantities by name or expression, and a value of each, such as ``{"x_max": 1.4}``: a branch ends
-        where the first of them is taken, exactly there, with the reason STOP.
+        Quantities by name, as expressions or as functions of an orbit, and a value of each, such as
+        ``{"x_max": 1.4}``: a branch ends where the first of them is taken, exactly there, with the reason
+        STOP.
 
     Returns
     -------

@@ -44,6 +44,9 @@ if TYPE_CHECKING:
 
 #: A first point this near to the orbit (scaled) is the one that belongs to it.
 _NEAR = 0.02
+#: Slopes along the orbits this small next to those by joints and parameters, which cancel, or next to the
+#: quantity itself, over the ranges: rounding. Orbits are solved to 1e-13, and a fold amplifies that.
+_STILL = 1e-10
 
 
 class Defects(NamedTuple):
@@ -165,6 +168,23 @@ class Held:
     def _every(self) -> Directions:
         """All scaled directions, one by one: for quantities whose rows are known, whatever the direction."""
         return self.directions(np.eye(len(self.weights)))
+
+    def still(self) -> bool:
+        """Tell whether the quantity does not move with the orbits: its slopes are rounding.
+
+        Next to their parts, the quantity, or (of one that is rounding itself) the states.
+        """
+        assert self.quantity is not None
+        orbit = self.orbit
+        try:
+            columns, row = self.in_plane(orbit), self.defects(orbit).rows[0]
+        except ConvergenceError:  # that is for the march to say
+            return False
+        slope = float(np.linalg.norm(row @ columns[:, 1:]))
+        parts = float(np.linalg.norm(row)) if in_rows(self.quantity) else 0.0
+        states = float(np.max(np.abs(orbit.joints[:, 1:])))
+        value = abs(self.value) if abs(self.value) > _STILL * states else states
+        return slope <= _STILL * max(parts, value)
 
     def in_plane(self, orbit: Orbit) -> FloatArray:
         """Return the shortest step to the orbits and the plane of them, scaled, shape (N m + q, 1 + q)."""

@@ -33,7 +33,7 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated
-from contfric.quantities.registry import Quantity, number_quantity
+from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 
 #: A start whose quantity is this near to the value (relative to 1 + its size) is on the curve.
 _AT_VALUE = 1e-9
@@ -41,7 +41,7 @@ _AT_VALUE = 1e-9
 
 def continue_quantity(
     orbit: Orbit,
-    quantity: str,
+    quantity: QuantityLike,
     value: float,
     parameters: tuple[str, str],
     ranges: Mapping[str, tuple[float, float]],
@@ -59,8 +59,8 @@ def continue_quantity(
     ----------
     orbit : Orbit
         Where to start.
-    quantity : str
-        A quantity by its name or as an expression, such as ``"x_max"``.
+    quantity : str or callable
+        A quantity by its name or as an expression, such as ``"x_max"``, or a function of an orbit.
     value : float
         What it is held at.
     parameters : (str, str)
@@ -102,7 +102,7 @@ def continue_quantity(
     """
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"continuation starts from an Orbit, got {type(orbit).__name__}")
-    held_quantity = number_quantity(quantity, orbit.model, "a curve")
+    held_quantity = number_quantity(quantity, orbit.model, "a curve", True)
     value = real_number("value", value)
     box = box_of(orbit.model, parameters, ranges)
     largest = largest_step(max_step, orbit.model)
@@ -110,11 +110,11 @@ def continue_quantity(
     function_of("progress", progress)
     start = _start(orbit, held_quantity, value, box, progress)
     held = Held(start, held_quantity, value, box)
-    first = held.first()
+    first = None if held.still() else held.first()
     if first is None:
         raise ConvergenceError(
-            f"the orbits with {quantity} = {value:g} have no unique direction at the start: it may not "
-            f"depend on {' and '.join(box.names)}, or be extreme there",
+            f"the orbits with {held_quantity.name} = {value:g} have no unique direction at the start: it may "
+            f"not depend on {' and '.join(box.names)}, or be extreme there",
             start,
         )
     return both_sides(held, first, largest, max_points, progress)
@@ -183,7 +183,7 @@ def _start(
     seen: list[str] = []
     for k, name in enumerate(box.names):
         bounds = float(box.low[k]), float(box.high[k])
-        stop_at = {quantity.name: value}
+        stop_at = {quantity.asked: value}
         branch = continue_orbit(
             orbit, name, bounds, stability=False, stop_at=stop_at, progress=progress
         )
@@ -192,7 +192,7 @@ def _start(
         ]
         if stopped:
             return branch[stopped[0]]
-        values = branch.quantity(quantity.name)
+        values = branch.quantity(quantity.asked)
         seen.append(f"from {np.min(values):.6g} to {np.max(values):.6g} along {name}")
     raise ConvergenceError(
         f"no orbit of this signature with {quantity.name} = {value:g} was found: it is {' and '.join(seen)}",

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 #: What the message of a fit is that Ctrl-C ended.
 INTERRUPTED = "interrupted"
+#: A sum of squares that errors of the given sizes exceed less often than this is called too large: one right
+#: fit in ten thousand is.
+_UNLIKELY = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,27 @@ class Fit(Tabled):
         """Sum of the squared residuals; about as many as data less free parameters if the model is right."""
         return float(self.residuals @ self.residuals)
 
+    @property
+    def reduced_chi_square(self) -> float:
+        """The same by data less free parameters: about 1 if the model is right; nan without any to spare."""
+        spare = len(self.residuals) - len(self.free)
+        return self.chi_square / spare if spare else float("nan")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What makes the fit doubtful, one line each: it is not converged, or misses its data."""
+        found = [] if self.converged else [f"not converged: {self.message}"]
+        spare = max(1, len(self.residuals) - len(self.free))
+        from scipy.special import chdtrc
+
+        if not chdtrc(spare, self.chi_square) >= _UNLIKELY:
+            found.append(
+                f"the fit misses its data: chi^2 = {self.chi_square:.4g} where about {spare} is expected; "
+                "the standard deviations of the parameters do not hold (a wrong model, data of another "
+                "branch, another minimum, or a sigma that is too small)"
+            )
+        return tuple(found)
+
     def columns(self) -> Columns:
         """Return one row for each measured value, with what the model says and all parameters there."""
         sizes = [len(d) if isinstance(d, Series) else 1 for d in self.data]
@@ -146,7 +170,8 @@ class Fit(Tabled):
         found = ", ".join(
             f"{name} = {self.params[name]:.6g} +- {s:.2g}" for name, s in self.sigma.items()
         )
-        return f"<Fit {found}; chi^2 = {self.chi_square:.4g} of {len(self.residuals)} data>"
+        doubts = "".join(f"; {note.partition(':')[0]}" for note in self.notes)
+        return f"<Fit {found}; chi^2 = {self.chi_square:.4g} of {len(self.residuals)} data{doubts}>"
 
 
 def what_of(datum: Datum) -> str:

@@ -18,13 +18,13 @@ import numpy as np
 
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
-from contfric.errors import ConvergenceError, ParameterError, shown
+from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.at_once import differentiated_at_once
 from contfric.quantities.measure import NumberWithGradient, differentiated
 from contfric.quantities.motion import Directions, along_parameters
-from contfric.quantities.registry import number_quantity
+from contfric.quantities.registry import QuantityLike, many, number_quantity
 
 #: A margin below this (nondimensional) vanishes: the orbit is at an event. Located events are good to 1e-12.
 _AT_EVENT = 1e-9
@@ -86,26 +86,22 @@ class Gradient(Tabled, Mapping[str, float]):
         return f"<Gradient of {self.quantity} = {self.value:.6g}: {slopes}>"
 
 
-def gradient_of(orbit: Orbit, name: str) -> Gradient:
+def gradient_of(orbit: Orbit, name: QuantityLike) -> Gradient:
     """Return the derivatives of a quantity by every parameter; see :meth:`contfric.Orbit.gradient`."""
-    quantity = number_quantity(name, orbit.model, "a gradient")
+    quantity = number_quantity(name, orbit.model, "a gradient", True)
     found = differentiated(quantity, orbit, by_parameters(orbit))
-    return _gradient(orbit, name, found, _events(orbit))
+    return _gradient(orbit, quantity.name, found, _events(orbit))
 
 
-def gradients_of(orbit: Orbit, names: Iterable[str]) -> dict[str, Gradient]:
+def gradients_of(orbit: Orbit, names: Iterable[QuantityLike]) -> dict[str, Gradient]:
     """Return the derivatives of several quantities; see :meth:`contfric.Orbit.gradients`."""
-    given: object = names  # whatever the user gave
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        example = given if isinstance(given, str) else "x_max"
-        raise ParameterError(
-            f"gradients takes a list of quantities, such as ['{example}'], got {shown(given)}"
-        )
-    quantities = {name: number_quantity(name, orbit.model, "a gradient") for name in names}
-    found = differentiated_at_once([*quantities.values()], orbit, by_parameters(orbit))
+    every = many("gradients", names)
+    quantities = [number_quantity(name, orbit.model, "a gradient", True) for name in every]
+    found = differentiated_at_once(quantities, orbit, by_parameters(orbit))
     events = _events(orbit)
     return Named(
-        (n, _gradient(orbit, n, g, events)) for n, g in zip(quantities, found, strict=True)
+        (q.name, _gradient(orbit, q.name, g, events))
+        for q, g in zip(quantities, found, strict=True)
     )
 
 

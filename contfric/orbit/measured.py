@@ -125,15 +125,16 @@ class MeasuredOrbit(Shown):
         orbit = cast("Orbit", self)
         return of_orbit(quantity_of(name, orbit.model), orbit)
 
-    def gradient(self, name: str) -> Gradient:
+    def gradient(self, name: QuantityLike) -> Gradient:
         """Return the derivatives of a quantity by every parameter, along orbits of this signature.
 
         Exact: by the implicit function theorem on the solved equations, and the flow's own derivatives.
 
         Parameters
         ----------
-        name : str
-            A quantity by its name or as an expression.
+        name : str or callable
+            A quantity by its name or as an expression. Of a function of an orbit the derivatives are
+            differences, along the exact derivatives of the orbit.
 
         Returns
         -------
@@ -159,7 +160,7 @@ class MeasuredOrbit(Shown):
 
         return gradient_of(cast("Orbit", self), name)
 
-    def gradients(self, names: Iterable[str]) -> dict[str, Gradient]:
+    def gradients(self, names: Iterable[QuantityLike]) -> dict[str, Gradient]:
         """Return the derivatives of several quantities, each as :meth:`gradient` returns it, at less cost.
 
         Integrals are computed in one pass: they agree with those of each quantity alone to rounding.

@@ -30,7 +30,7 @@ _ORBIT: dict[str, Any] = {
     "markersize": 5,
 }
 #: What a legend says of starts without a solution.
-_NONE = {"no_motion": "no solution starts there"}
+_NONE = {"no_solution": "no solution starts there"}
 
 
 def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:

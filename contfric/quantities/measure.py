@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.quantities.motion import Directions, IndexArray
 
-#: Displacement of an orbit for the derivatives of multipliers, relative to its size: its fourth power, and
-#: rounding divided by it, are both about 1e-12.
+#: Displacement of an orbit for the derivatives of multipliers and functions, relative to its size: its
+#: fourth power, and rounding divided by it, are both about 1e-12.
 _STEP = 1e-3
 #: Shares of it tried where two steps differ by more than this, as they do near multipliers that meet.
 _SHARES, _AGREE = (1.0, 0.1, 0.01), 1e-6
@@ -99,8 +99,10 @@ def differentiated(
     Raises
     ------
     ParameterError
-        If it is a function or a list of numbers, which have no derivatives here.
+        If it is a list of numbers, which has no derivatives.
     """
+    if quantity.function is not None:
+        return _of_function(quantity, orbit, directions)
     if quantity.parsed is None:
         raise ParameterError(
             f"'{quantity.name}' has no derivatives: give a quantity by its name, or as an expression"
@@ -115,6 +117,25 @@ def differentiated(
         return NumberWithGradient(value, slopes, slopes)
     found = None if directions is None else _extreme(quantity, orbit, directions)
     return found or _measured(quantity.parsed, orbit, directions, known or {})
+
+
+def _of_function(
+    quantity: Quantity, orbit: Orbit, directions: Directions | None
+) -> NumberWithGradient:
+    """Return a user's function of an orbit, with differences as its derivatives."""
+
+    def measure(moved: Orbit) -> float:
+        found = _number(quantity, _called(quantity, moved))
+        if not math.isfinite(found):
+            raise ParameterError(f"the function {quantity.name} of an orbit returned {found}")
+        return found
+
+    value = measure(orbit)
+    if directions is None:
+        return NumberWithGradient(value, np.empty(0), np.empty(0))
+    slopes, unsure = _differences(measure, orbit, directions)
+    kinks = (f"the function {quantity.name} may have a kink here",) if unsure else ()
+    return NumberWithGradient(value, slopes, slopes, kinks)
 
 
 def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> NumberWithGradient | None:
@@ -256,10 +277,8 @@ def multiplier(measuring: Measuring) -> Dual:
         return measuring.number(value, np.empty(0))
     if not np.isfinite(value):
         raise ParameterError("the multipliers of an orbit with a hold are infinite: no derivatives")
-    pairs = [_difference(motion.orbit, motion.directions, k) for k in range(motion.count)]
-    slopes = np.array([slope for slope, _ in pairs])
-    apart = np.array([error for _, error in pairs])
-    if np.any(apart > _UNSURE * (1.0 + np.abs(slopes))):
+    slopes, unsure = _differences(_largest_modulus, motion.orbit, motion.directions)
+    if unsure:
         measuring.kinks.append("two multipliers of one modulus part here, or meet")
     return measuring.number(value, slopes)
 
@@ -268,8 +287,20 @@ def _largest_modulus(orbit: Orbit) -> float:
     return float(np.max(np.abs(orbit.multipliers), initial=0.0))
 
 
-def _difference(orbit: Orbit, directions: Directions, k: int) -> tuple[float, float]:
-    """Return the derivative of the largest modulus in one direction, and by how much two steps differ."""
+def _differences(
+    measure: Callable[[Orbit], float], orbit: Orbit, directions: Directions
+) -> tuple[FloatArray, bool]:
+    """Return the derivatives of a number in all directions, and whether they may be those of a kink."""
+    count = directions.vector.shape[1]
+    pairs = np.array([_difference(measure, orbit, directions, k) for k in range(count)])
+    slopes, apart = pairs.reshape(-1, 2).T
+    return slopes.copy(), bool(np.any(apart > _UNSURE * (1.0 + np.abs(slopes))))
+
+
+def _difference(
+    measure: Callable[[Orbit], float], orbit: Orbit, directions: Directions, k: int
+) -> tuple[float, float]:
+    """Return the derivative of a number in one direction, and by how much two steps differ."""
     joints, vector = directions.joints[:, :, k], directions.vector[:, k]
     size = max(float(np.max(np.abs(joints))), float(np.max(np.abs(vector))))
     if size == 0.0:
@@ -278,7 +309,7 @@ def _difference(orbit: Orbit, directions: Directions, k: int) -> tuple[float, fl
 
     def at(by: float) -> float:
         moved = replace(orbit, joints=orbit.joints + by * joints, vector=orbit.vector + by * vector)
-        return _largest_modulus(moved)
+        return measure(moved)
 
     best = 0.0, np.inf
     for share in _SHARES:

@@ -7,7 +7,7 @@ anything is computed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -94,6 +94,11 @@ class Quantity:
         return NAMED.get(self.name) if self.function is None else None
 
     @property
+    def asked(self) -> QuantityLike:
+        """What it can be asked for by again."""
+        return self.function or self.name
+
+    @property
     def several(self) -> bool:
         """Whether it is a list of numbers."""
         return self.named is not None and self.named.several
@@ -134,14 +139,20 @@ def quantity_of(asked: QuantityLike, model: Model) -> Quantity:
     )
 
 
-def number_quantity(asked: object, model: Model, what: str) -> Quantity:
+def number_quantity(asked: object, model: Model, what: str, functions: bool = False) -> Quantity:
     """Return a quantity that is one number given by name or expression; ``what`` asks for it.
+
+    Parameters
+    ----------
+    functions : whether it may be a function of an orbit: not where it is written to files
 
     Raises
     ------
     ParameterError
-        If it is a function, or a list of numbers.
+        If it is a list of numbers, or a function where it may not be one.
     """
+    if functions and callable(asked):
+        return quantity_of(asked, model)
     if not isinstance(asked, str):
         raise ParameterError(
             f"{what} takes a quantity by name or expression, such as 'x_max' or 'rms(v)', got {shown(asked)}"
@@ -150,6 +161,28 @@ def number_quantity(asked: object, model: Model, what: str) -> Quantity:
     if found.several:
         raise ParameterError(f"{what} takes a quantity that is one number, and '{asked}' is a list")
     return found
+
+
+def many(what: str, asked: object) -> list[Any]:
+    """Return several quantities that ``what`` is asked for, as a list.
+
+    Raises
+    ------
+    ParameterError
+        If they are no list.
+    """
+    if isinstance(asked, str) or not isinstance(asked, Iterable):
+        example = asked if isinstance(asked, str) else "x_max"
+        raise ParameterError(
+            f"{what} takes a list of quantities, such as ['{example}'], got {shown(asked)}"
+        )
+    return [*asked]
+
+
+def columns_asked(asked: object, model: Model) -> list[Quantity]:
+    """Return the quantities that a table is to have columns of, without the stops, which it has."""
+    found = [quantity_of(each, model) for each in many("to_dataframe", asked)]
+    return [quantity for quantity in found if not quantity.several]
 
 
 def quantity_names(model: Any) -> list[str]:

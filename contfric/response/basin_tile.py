@@ -84,7 +84,7 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
     motions = np.full(count, Motion.PERIODIC.code, dtype=np.uint8)
     known = {
         trajectory.HELD: Motion.HELD,
-        trajectory.IMPOSSIBLE: Motion.NO_MOTION,
+        trajectory.IMPOSSIBLE: Motion.NO_SOLUTION,
         trajectory.INFINITE: Motion.UNBOUNDED,
         trajectory.CHATTER: Motion.CHATTER,
         tangent.BROKEN: Motion.BROKEN,

@@ -20,7 +20,7 @@ class Outcome(Coded):
     APERIODIC = "it did not repeat itself within the periods followed; the points are all of them"
     HELD = "it ends at rest, for ever"
     UNBOUNDED = "it grew with no bound in sight"
-    NO_MOTION = "no solution starts there, or its events follow each other at once"
+    NO_SOLUTION = "no solution starts there, or its events follow each other at once"
     CHATTER = (
         "impacts follow each other faster and faster; it goes on if the reset has chatter: true"
     )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from contfric.base.files import replacing
 from contfric.errors import did_you_mean
 from contfric.study.schema import FIGURES, Figure, Format, JournalWidth, StudyFile
-from contfric.study.wanted import Row
+from contfric.study.wanted import ROWS, Row
 
 if TYPE_CHECKING:
     from contfric.base.yaml_lines import LocatedYaml
@@ -75,24 +75,9 @@ def _rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | s
             located.fail(("figures", index, "inset"), "only a diagram has insets")
         return ()
     if figure.rows is None:
-        return _default_rows(located, content, index)
-    for place, row in enumerate(figure.rows):
-        if isinstance(row, Row) and row.needs is not None and row.needs not in content.want:
-            located.fail(
-                ("figures", index, "rows", place),
-                f"row '{row.value}' shows {row.needs.value}: add {row.needs.value} to 'want'",
-            )
+        wanted = tuple(row for want, row in ROWS.items() if want in content.want)
+        return wanted or (Row.X_MAX,)
     return tuple(figure.rows)
-
-
-def _default_rows(located: LocatedYaml, content: StudyFile, index: int) -> tuple[Row | str, ...]:
-    rows = tuple(r for r in (Row.X_MAX, Row.STOPS, Row.PSI) if r.needs in content.want)
-    if not rows:
-        located.fail(
-            ("figures", index),
-            "a diagram has nothing to show: add any of extrema, stops, asymmetry to 'want'",
-        )
-    return rows
 
 
 def _file_name(located: LocatedYaml, figure: Figure, index: int, taken: list[str]) -> str:

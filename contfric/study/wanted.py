@@ -35,18 +35,9 @@ class Row(str, Enum):
     PSI = "psi"
     PERIOD = "period"
 
-    @property
-    def needs(self) -> Want | None:
-        """The quantity that the row shows; None for one that is always there."""
-        return _NEEDS.get(self)
 
-
-_NEEDS = {
-    Row.X_MAX: Want.EXTREMA,
-    Row.X_MIN: Want.EXTREMA,
-    Row.STOPS: Want.STOPS,
-    Row.PSI: Want.ASYMMETRY,
-}
+#: The row that a figure has for what is wanted, where it names no rows.
+ROWS = {Want.EXTREMA: Row.X_MAX, Want.STOPS: Row.STOPS, Want.ASYMMETRY: Row.PSI}
 
 
 def row_name(row: Row | str) -> str:

@@ -288,3 +288,31 @@ def test_a_stable_set_in_a_study(write, tmp_path: Path) -> None:
     assert isinstance(coarse, cf.StableSet) and coarse.complete and len(coarse.points) > 20
     apart = [np.min(np.linalg.norm(edge.points - p, axis=1)) for p in coarse.points]
     assert np.mean(np.array(apart) < 0.01) > 0.8  # beyond a gap one of them may have ended
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_fit_that_misses_its_data_says_so(
+    seed: int, orbit: cf.Orbit, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Noise as large as it is said to be is no reason; a signal that the model does not have is one."""
+    from contfric.cli import main
+
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.uniform(0.0, 2.0 * orbit.period, 60))
+    sigma, wrong = 10.0 ** rng.uniform(-4.0, -2.0), rng.uniform(10.0, 100.0)
+    values = np.array([orbit.state(t)[0] for t in times]) + sigma * rng.standard_normal(60)
+    for off in (0.0, wrong):
+        series = cf.Series("x", times, values + off * sigma * np.cos(5.0 * times), sigma)
+        found = cf.fit("coulomb", [series], {"Omega": 0.5, "S": 0.31, "S0": 0.41}, ["S", "S0"])
+        assert found.converged and found.reduced_chi_square == found.chi_square / 58
+        assert ("misses its data" in repr(found)) == bool(found.notes) == bool(off)
+        np.savetxt(tmp_path / "x.csv", np.column_stack([times, series.values]), delimiter=",")
+        study = tmp_path / "s.yaml"
+        study.write_text(
+            "model: coulomb\nparams: {Omega: 0.5, S: 0.31, S0: 0.41}\n"
+            f"fit: {{free: [S, S0], data: [{{series: x, file: x.csv, sigma: {sigma!r}}}]}}\n"
+        )
+        assert main(["run", str(study), "--out", str(tmp_path / f"out{off}")]) == 0
+        said = capsys.readouterr().out
+        assert f"{found.reduced_chi_square:.4g} a degree of freedom" in said
+        assert ("warning: the fit misses its data" in said) == bool(off)

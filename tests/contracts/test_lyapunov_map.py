@@ -97,7 +97,7 @@ def test_codes_of_the_kernel_are_those_of_the_enumeration() -> None:
         Motion.UNDECIDED: endings.UNDECIDED,
         Motion.HELD: endings.AT_REST,
         Motion.UNBOUNDED: endings.UNBOUNDED,
-        Motion.NO_MOTION: endings.NO_MOTION,
+        Motion.NO_SOLUTION: endings.NO_MOTION,
         Motion.BROKEN: endings.BROKEN,
         Motion.CHATTER: endings.CHATTERS,
         Motion.UNCUT: endings.UNCUT,

@@ -70,8 +70,17 @@ def test_functions_count_and_must_return_numbers(orbit: cf.Orbit, branch: cf.Bra
     assert branch.quantity(lambda o: o.period).shape == branch.values.shape
     with pytest.raises(ParameterError, match="must return a number, got 'large'"):
         orbit.quantity(lambda _: "large")
-    with pytest.raises(ParameterError, match="a gradient takes a quantity by name or expression"):
-        orbit.gradient(lambda o: o.x_max)  # type: ignore[arg-type]
+    for wrong, words in ((lambda _: "large", "must return a number"), (lambda _: np.nan, "nan")):
+        for ask in (
+            orbit.gradient,
+            branch.extrema,
+            lambda f: cf.continue_orbit(orbit, "Omega", (0.48, 0.53), stop_at={f: 1.4}),
+            lambda f: cf.continue_quantity(
+                orbit, f, 1.4, ("Omega", "S"), {"Omega": (0.48, 0.53), "S": (0.3, 0.35)}
+            ),
+        ):
+            with pytest.raises(ParameterError, match=words):
+                ask(wrong)
 
 
 def test_a_branch_has_the_values_of_its_orbits(branch: cf.Branch) -> None:
@@ -277,7 +286,8 @@ def test_a_diagram_stops_at_the_same_orbits_for_either_mirror_image(
         ({"xmax": 1.4}, "has no quantity 'xmax'"),
         ({"x_max": "high"}, "stop_at['x_max'] is a finite number"),
         ("x_max", "stop_at is a mapping, such as {'x_max': 1.4}"),
-        ({len: 1.4}, "stop_at takes a quantity by name or expression"),
+        ({3: 1.4}, "stop_at takes a quantity by name or expression"),
+        ({len: 1.4}, "the function len of an orbit raised TypeError"),
         ({"stops": 1.4}, "takes a quantity that is one number"),
     ],
 )

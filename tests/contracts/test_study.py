@@ -120,14 +120,6 @@ def run_python(code: str, *args: object) -> subprocess.CompletedProcess[str]:
         (HEAD + "start: {simulate: {}, signature: 1a}\n", 3, "got simulate and signature"),
         (HEAD + "figures: [{kind: diagram}]\n", 3, "a diagram needs 'explore' or 'continue'"),
         (HEAD + "figures: [{kind: branches}]\n", 3, "a graph of branches needs 'explore'"),
-        (HEAD + EXPLORE + "figures: [{kind: diagram}]\n", 4, "nothing to show: add any of extrema"),
-        (
-            HEAD
-            + EXPLORE
-            + "want: [extrema]\nfigures:\n- kind: diagram\n  rows:\n  - x_max\n  - psi\n",
-            9,
-            "row 'psi' shows asymmetry: add asymmetry to 'want'",
-        ),
         (HEAD + "figures: [{kind: orbit, rows: [psi]}]\n", 3, "only a diagram has rows"),
         (
             HEAD + "figures: [{kind: orbit, file: a/b.png}]\n",
@@ -362,6 +354,17 @@ def test_quantities_that_are_not_wanted_are_not_computed(tmp_path, write, monkey
     cf.run_study(write(HEAD + CONTINUE), tmp_path / "out")
     with pytest.raises(UnwrittenError, match="nobody wants it"):
         cf.run_study(write(HEAD + CONTINUE + "want: [asymmetry]\n"), tmp_path / "other")
+
+
+@pytest.mark.parametrize("want", ["[]", "[stops]", "[extrema]"])
+@pytest.mark.parametrize("rows", ["", ", rows: [x_max]", ", rows: [psi, stops, x_min, energy]"])
+def test_rows_need_no_columns(tmp_path, write, want, rows) -> None:
+    """A figure shows its rows, whatever columns are wanted; without rows it has one all the same."""
+    text = HEAD + EXPLORE + f"want: {want}\nfigures: [{{kind: diagram{rows}}}]\n"
+    cf.run_study(write(text), tmp_path / "out")
+    header = list(rows_of(tmp_path / "out" / "points.csv")[0])
+    assert ("x_max" in header, "stop_1" in header) == ("extrema" in want, "stops" in want)
+    assert (tmp_path / "out" / "diagram.png").stat().st_size > 5000
 
 
 @pytest.mark.parametrize("figures", ["", "figures: [{kind: orbit}]\n"])

@@ -197,3 +197,77 @@ def test_gradients_say_what_they_take() -> None:
     with pytest.raises(ContfricError, match="enrgy"):
         orbit.gradients(["energy", "enrgy"])
     assert orbit.gradients([]) == {}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_functions_of_an_orbit_are_used_as_expressions_are(seed: int) -> None:
+    """In gradients, tables, values to stop at, extrema and curves: the same as what they are written with."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(0.5, 2.0, 2).tolist()
+
+    def mixed(orbit: cf.Orbit) -> float:
+        return a * orbit.x_max + b * float(orbit.quantity("rms(v)"))
+
+    text = f"{a!r}*x_max + {b!r}*rms(v)"
+    params = {"Omega": rng.uniform(0.49, 0.53), "S": rng.uniform(0.31, 0.33), "S0": 0.4}
+    orbit = cf.find_orbit("coulomb", params)
+    exact, found = orbit.gradient(text), orbit.gradients([mixed])["mixed"]
+    assert found.value == pytest.approx(exact.value, rel=1e-14) and found.notes == ()
+    for name in ("Omega", "S", "S0", "zeta"):
+        assert found[name] == pytest.approx(exact[name], rel=1e-7, abs=1e-8)
+    branch = cf.continue_orbit(orbit, "Omega", (0.45, 0.56))
+    table = branch.to_dataframe([mixed, "stops"])
+    np.testing.assert_allclose(table["mixed"], branch.quantity(text), rtol=1e-14)
+    for one, other in zip(branch.extrema(mixed), branch.extrema(text), strict=True):
+        assert one.largest == other.largest
+        assert one.params["Omega"] == pytest.approx(other.params["Omega"], abs=1e-7)
+    value = exact.value + 0.005 * exact["Omega"]
+    by_function, by_text = (
+        cf.continue_orbit(orbit, "Omega", (0.45, 0.56), stop_at={what: value})
+        for what in (mixed, text)
+    )
+    assert by_function.values[[0, -1]] == pytest.approx(by_text.values[[0, -1]], abs=1e-10)
+    ranges = {"Omega": (0.49, 0.53), "S": (0.3, 0.34)}
+    curve = cf.continue_quantity(orbit, mixed, value, ("Omega", "S"), ranges, max_points=15)
+    assert len(curve) > 5 and curve.quantity == "mixed"
+    assert max(abs(mixed(each) - value) for each in curve) < 1e-11
+
+
+def test_a_function_is_refused_where_files_keep_the_question() -> None:
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    with pytest.raises(cf.ParameterError, match="a diagram takes quantities by name"):
+        cf.explore(orbit, "Omega", (0.48, 0.53), stop_at={lambda o: o.x_max: 1.4})
+    branch = cf.continue_orbit(orbit, "Omega", (0.49, 0.51))
+    with pytest.raises(
+        cf.ParameterError, match=r"takes a list of quantities, such as \['energy'\]"
+    ):
+        branch.to_dataframe("energy")
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_jumps_and_poles_of_a_quantity_are_no_values_of_it(seed: int) -> None:
+    """A branch stops where the quantity has the value, and not where it passes it by infinity or a jump."""
+    rng = np.random.default_rng(seed)
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    plain = cf.continue_orbit(orbit, "Omega", (0.48, 0.53))
+    low, high = float(plain.x_max.min()), float(plain.x_max.max())
+    at, value = low + rng.uniform(0.2, 0.5) * (high - low), rng.uniform(0.5, 3.0)
+    far = 5.0 * value / (high - low)  # taken beyond the pole, some steps away from it
+    for text, wanted, taken in [
+        (f"1/(x_max - {at!r})", 0.01 * value, False),
+        (f"where(x_max > {at!r}, 2, 1)", 1.5, False),
+        (f"sign(x_max - {at!r})", 0.3, False),
+        (f"1/(x_max - {at!r})", far, True),
+        (f"log(x_max - {at!r})", float(np.log(0.3 * (high - at))), True),
+        (f"sqrt({low - 1.0!r} - x_max)", 1.0, False),
+    ]:
+        branch = cf.continue_orbit(orbit, "Omega", (0.48, 0.53), stop_at={text: wanted})
+        stopped = [i for i, e in zip((0, -1), branch.ends, strict=True) if e.reason.name == "STOP"]
+        assert bool(stopped) == taken, text
+        for i in stopped:
+            assert branch[i].quantity(text) == pytest.approx(wanted, rel=1e-8)
+        assert all(np.isfinite(e.value) for e in plain.extrema(text))
+        if not taken:
+            ranges = {"Omega": (0.48, 0.53), "S": (0.315, 0.325)}
+            with pytest.raises(cf.ConvergenceError, match="no orbit of this signature"):
+                cf.continue_quantity(orbit, text, wanted, ("Omega", "S"), ranges)

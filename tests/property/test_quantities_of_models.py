@@ -58,3 +58,33 @@ def test_what_comes_back_has_no_integral(name: str) -> None:
     assert orbit.model.states[0] == "x"
     assert orbit.quantity("integral(v)") == pytest.approx(0.0, abs=1e-10)
     assert np.isfinite(orbit.quantity("phase(x, 1)"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_curve_of_what_does_not_move_is_refused(seed: int) -> None:
+    """What is constant along all orbits has no curve, whatever it is written with; what moves has one."""
+    rng = np.random.default_rng(seed)
+    a, b = (10.0 ** rng.uniform(-6.0, 6.0, 2)).tolist()
+    damped, forced = cf.find_orbit("blade-damper"), cf.find_orbit("impact")
+    constant = [
+        (damped, f"{a!r}*mean(q1)"),  # zero by symmetry
+        (damped, f"{a!r}*(max(v2) + min(v2))"),
+        (damped, "amplitude(q2, 2)"),
+        (damped, f"{a!r}*period*W + {b!r}"),
+        (forced, f"where(x_max > 0, {a!r}*x_max, 0)"),  # the wall
+        (forced, f"{a!r}*mean(v)"),
+    ]
+    moving = [(damped, f"{a!r}*rms(q1)"), (damped, f"{b!r}*max(v2)"), (forced, f"{a!r}*mean(x)")]
+    for orbit, quantity in [*constant, *moving]:
+        names = orbit.model.parameter_names[:2]
+        ranges = {n: (0.9 * orbit.params[n], 1.1 * orbit.params[n]) for n in names}
+        value = float(orbit.quantity(quantity))
+
+        def curve(start=orbit, what=quantity, at=value, of=names, box=ranges) -> cf.QuantityCurve:
+            return cf.continue_quantity(start, what, at, of, box, max_points=8)
+
+        if (orbit, quantity) in moving:
+            assert len(curve()) > 4, quantity
+            continue
+        with pytest.raises(cf.ConvergenceError, match="no unique direction"):
+            curve()

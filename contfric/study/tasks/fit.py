@@ -155,18 +155,20 @@ class FitTask(Response):
             "data": len(found.residuals),
             "converged": found.converged,
             "message": found.message,
+            "notes": list(found.notes),
         }
 
     @classmethod
     def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
         """Yield the parameters as a table."""
-        yield f"fit to {entry['data']} values: chi^2 = {entry['chi_square']:.4g}"
+        chi_square, spare = entry["chi_square"], entry["data"] - len(entry["params"])
+        reduced = f", {chi_square / spare:.4g} a degree of freedom" if spare else ""
+        yield f"fit to {entry['data']} values: chi^2 = {chi_square:.4g}{reduced}"
         rows = [["", "value", "standard deviation"]]
         for name, value in entry["params"].items():
             rows.append([name, f"{value:.10g}", f"{entry['sigma'][name]:.2g}"])
         yield from aligned(rows)
-        if not entry["converged"]:
-            yield f"not converged: {entry['message']}"
+        yield from (f"warning: {note}" for note in entry["notes"])
 
 
 def _position(event: Any) -> float:
