@@ -15,6 +15,7 @@ from contfric.continuation.events import Decision, EndReason
 from contfric.continuation.points import Settings
 from contfric.continuation.switching import leave_along
 from contfric.continuation.trace import follow_orbit
+from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
@@ -67,15 +68,20 @@ def _follow_through(
         there = refine(start.point.orbit(orbit, active), damped=False)
         if not (there.converged and there.admissible):
             continue
-        if not state.knows(event, reason, there):
-            state.take(event, reason, whole_branch(there, settings))
-        return
+        if state.knows(event, reason, there):
+            return
+        if (branch := whole_branch(there, settings)) is not None:
+            state.take(event, reason, branch)
+            return
     state.judge(event, reason, Decision.REFUSED, why="no orbit near the event was found")
 
 
-def whole_branch(orbit: Orbit, settings: Settings) -> Branch:
-    """Return the branch of an orbit, both ways."""
-    return follow_orbit(orbit, settings_for(orbit, settings))
+def whole_branch(orbit: Orbit, settings: Settings) -> Branch | None:
+    """Return the branch of an orbit, both ways; None if it is one of a continuum at each parameter value."""
+    try:
+        return follow_orbit(orbit, settings_for(orbit, settings))
+    except ConvergenceError:
+        return None
 
 
 def starts_along(branch: Branch, crossing: Crossing, direction: Direction, scale: float) -> bool:

@@ -8,7 +8,7 @@ from itertools import chain
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
-from contfric.atlas.matching import same_kind, same_location
+from contfric.atlas.matching import same_event
 from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
@@ -55,7 +55,7 @@ def follow_departure(
             first_step=_first_step(distance, settings),
             progress=state.progress,
         )
-        if went_somewhere(side, event) and not _comes_back(side, event, settings):
+        if went_somewhere(side, event, settings) and not _comes_back(side, event, settings):
             first = first_end(reason, event, side, settings)
             state.accept(event, text, assemble(orbit, settings, side, first, departure.origin))
             return
@@ -108,9 +108,7 @@ def ends_at(end: End, event: Event, settings: Settings) -> bool:
     at a branch point, the branch between is as short, and its parameter changes by the square of that.
     """
     last, b = end.bifurcation, event.bifurcation
-    if last is None or not same_kind(last, b):
-        return False
-    return same_location(last, b, settings.parameter, settings.width)
+    return last is not None and same_event(last, b, settings.parameter, settings.width)
 
 
 def foresee_departures(state: Exploration, event: Event) -> None:

@@ -36,8 +36,9 @@ Progress = Callable[[str], None]
 #: Kinds that leave nothing to follow: the branch itself goes on.
 _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 #: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
-#: at the event: located tips are good to 1e-10, those near a singular point to 1e-6.
-_SAME_LOCATION, _SAME_STOPS = 1e-8, 1e-6
+#: at the event; one that is located agrees to the last, or to what it is known to: two sides of a symmetric
+#: orbit may meet their events one after the other within the first.
+_SAME_LOCATION, _SAME_STOPS, _LOCATED = 1e-8, 1e-6, 1e-10
 
 
 def _alike(one: Orbit, other: Orbit) -> bool:
@@ -224,13 +225,14 @@ class Exploration:
                 continue
             if identity_of(branch) != wanted:
                 continue
-            for end in branch.ends:
-                b = end.bifurcation
-                if b and same_event(b, event.bifurcation, self.settings.parameter, width):
-                    return index
-            for tip in (branch[0], branch[-1]):
+            for end, tip in zip(branch.ends, (branch[0], branch[-1]), strict=True):
+                b, known = end.bifurcation, _SAME_LOCATION
+                if b is not None:
+                    if same_event(b, event.bifurcation, self.settings.parameter, width):
+                        return index
+                    known = max(_LOCATED, 2.0 * max(b.accuracy, event.bifurcation.accuracy))
                 gap = abs(tip.params[branch.parameter] - orbit.params[branch.parameter])
                 near = stops_distance(tip.stops, orbit.stops, mirror) < _SAME_STOPS
-                if gap < _SAME_LOCATION * width and near and _alike(tip, orbit):
+                if gap < known * width and near and _alike(tip, orbit):
                     return index
         return None

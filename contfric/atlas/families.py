@@ -71,6 +71,8 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
             if near is None or state.known(near) is not None:
                 continue
             branch = whole_branch(shortest(near), state.settings)
+            if branch is None:
+                continue
             ends = [end for end in branch.ends if meets(end, event, state.settings)]
             if ends and not fault_of(branch, state.settings.width):
                 state.accept(event, candidate.reason, branch, ends)

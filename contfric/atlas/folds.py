@@ -98,15 +98,17 @@ def _try_arms(
     """
     reason = _reason(near[0][1], sequence)
     for _, arms in near:
-        there = arms.orbit(sequence)
+        there = shortest(arms.orbit(sequence))  # of equal units it is that of one
         if not (there.converged and there.admissible):
             continue
         if state.knows(event, reason, there):
             return
         beyond = there if sequence == exchanged else arms.orbit(exchanged)
         if beyond is not there and not (beyond.converged and state.known(beyond) is not None):
-            state.accept(event, reason, whole_branch(there, state.settings))
-            return
+            if (branch := whole_branch(there, state.settings)) is not None:
+                state.accept(event, reason, branch)
+                return
+            continue
         point = first_point(there, settings_for(there, state.settings))
         if point is not None:
             _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)
@@ -160,8 +162,11 @@ def _add_crossing(
         _add_one_sided(state, event, orbit, point, reason)
         return
     active = orbit.model.index_of(state.settings.parameter)
-    there = point.orbit(orbit, active)
-    state.accept(event, reason, whole_branch(there, state.settings))
+    branch = whole_branch(point.orbit(orbit, active), state.settings)
+    if branch is None:
+        state.judge(event, reason, Decision.REFUSED, why=EndReason.CONTINUUM.value)
+    else:
+        state.accept(event, reason, branch)
 
 
 def _add_one_sided(

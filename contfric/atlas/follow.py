@@ -198,6 +198,8 @@ def _meeting(
         branch = next((b for b in traced if _passes(b, near)), None)
         if branch is None:
             branch = whole_branch(near, state.settings)
+            if branch is None:
+                continue
             state.elsewhere.append(branch)
         ends = [end for end in branch.ends if meets(end, event, state.settings)]
         if ends and not fault_of(branch, state.settings.width):
@@ -286,7 +288,7 @@ def _located_by(state: Exploration, branch: Branch, event: Event) -> tuple[Branc
     if branch.arc[-1] < _NOWHERE_ROUGHLY or not passed:
         return branch, []
     whole = whole_branch(branch[len(branch) // 2], state.settings)
-    if not elsewhere and len(whole.bifurcations) <= len(branch.bifurcations):
+    if whole is None or (not elsewhere and len(whole.bifurcations) <= len(branch.bifurcations)):
         return branch, []
     ends = [end for end in whole.ends if meets(end, event, state.settings)]
     # what begins outside or too far needs its own location, even if the event is known as well
@@ -349,7 +351,8 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     """Return the branch through an orbit at which it may be singular, from just next to it."""
-    return next((whole_branch(near, state.settings) for near in _next_to(state, orbit)), None)
+    found = (whole_branch(near, state.settings) for near in _next_to(state, orbit))
+    return next((branch for branch in found if branch is not None), None)
 
 
 def _next_to(state: Exploration, orbit: Orbit) -> Iterator[Orbit]:

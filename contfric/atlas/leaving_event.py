@@ -16,7 +16,7 @@ from contfric.base.attributes import altered
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate, directions
-from contfric.continuation.events import ACCURACY, Bifurcation, End, EndReason
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason
 from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, NEARER, start_beside
@@ -43,6 +43,8 @@ _BESIDE = 0.5**0.5
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
+#: Two events this many times their accuracies apart are two.
+_TOLD = 4.0
 #: The first start near an event that is singular, in roots of rounding: states are known there to a share
 #: of 1e-5, and what happens nearer changes the parameter by rounding only (by the square of this).
 _KNOWN = 500.0
@@ -102,7 +104,9 @@ def _longest_way(
     known = max(SAME_SOLUTION, event.bifurcation.accuracy**0.5)
     for there, side in _ways(orbit, settings, first_step, progress, known):
         stands = stands or abs(side.first.slope) < _STANDS * settings.width
-        if went_somewhere(side, event) and (longest is None or side.length > longest[1].length):
+        if went_somewhere(side, event, settings) and (
+            longest is None or side.length > longest[1].length
+        ):
             longest = there, side
         if longest is not None and side.length > _SURELY_AWAY:
             break
@@ -252,10 +256,20 @@ def settings_for(orbit: Orbit, settings: Settings) -> Settings:
     return altered(settings, stability=False) if orbit.system.holds else settings
 
 
-def went_somewhere(side: Side, event: Event) -> bool:
-    """Tell whether what was traced away from an event got anywhere."""
-    rough = event.bifurcation.accuracy > ACCURACY
-    return side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE)
+def went_somewhere(side: Side, event: Event, settings: Settings) -> bool:
+    """Tell whether what was traced away from an event got anywhere.
+
+    A regular orbit may meet the next event at once: two stops of a nearly symmetric one reach a boundary one
+    after the other. Both events are known then to less than what is between them.
+    """
+    there, end = event.bifurcation, side.end.bifurcation
+    rough = there.accuracy > ACCURACY
+    if side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE):
+        return True
+    if rough or end is None or end.kind not in TERMINAL or side_is_bridge(side):
+        return False
+    gap = abs(end.params[settings.parameter] - there.params[settings.parameter]) / settings.width
+    return gap > _TOLD * (there.accuracy + end.accuracy)
 
 
 def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:

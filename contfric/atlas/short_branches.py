@@ -275,7 +275,7 @@ def _as_event(vertex: Orbit, settings: Settings, kind: Kind) -> Event | None:
     """Return a vertex as an event of its own branch; None if it is not told from what is next to it."""
     there = Bifurcation(kind, vertex.params, vertex, (), 0.0, None, None)
     branch = whole_branch(vertex, settings)
-    for b in branch.bifurcations:
+    for b in () if branch is None else branch.bifurcations:
         if b.kind is kind and same_location(b, there, settings.parameter, settings.width):
             return Event(replace(b, stable_before=None), [], [])
     return None

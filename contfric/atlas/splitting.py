@@ -32,7 +32,7 @@ def follow_split(state: Exploration, event: Event) -> bool:
         if beside is None or state.known(beside) is not None:
             continue
         branch = whole_branch(beside, state.settings)
-        if not any(ends_at(end, event, state.settings) for end in branch.ends):
+        if branch is None or not any(ends_at(e, event, state.settings) for e in branch.ends):
             continue
         state.accept(event, _REASON, branch)
         return True

@@ -22,7 +22,9 @@ from contfric.continuation.folds import (
 from contfric.continuation.locate_change import locate_change, locate_label
 from contfric.continuation.near_sliding_events import (
     NO_LENGTH,
+    SAME_FOLD,
     SAME_LOCATION,
+    SAME_VALUE,
     first_told,
     last_told,
 )
@@ -58,6 +60,7 @@ def smooth_events(
 
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     # events after a sliding one do not happen
+    slides = beyond is not after
     after = last_told(orbit, before, after, beyond, settings) or after
     told = first_told(orbit, before, after, settings)
     values = zip(
@@ -93,7 +96,14 @@ def smooth_events(
                 if point is None
                 else fold_at(orbit, before, after, beyond, point, settings)
             )
-            found += [fold for fold in folds if not _is_sliding(orbit, before, fold[0], active)]
+            at_end = slides and _is_at_end(before, after, share, settings)
+            found += [
+                fold
+                for fold in folds
+                if not (
+                    _is_sliding(orbit, before, fold[0], active) or (at_end and not fold[0].located)
+                )
+            ]
         elif point is not None:
             found += _at_multiplier(orbit, column, before, beyond, point, settings)
         elif lost:  # a pole is no event: multipliers are infinite where an exit becomes tangential
@@ -112,6 +122,16 @@ def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> 
         return False
     here = before.orbit(orbit, active)
     return left < _FALLEN * float(here.margins.min(initial=np.inf))
+
+
+def _is_at_end(before: Point, after: Point, share: float, settings: Settings) -> bool:
+    """Tell whether a slope changes its sign so near to a sliding event that a fold there is a part of it.
+
+    Where the parameter stands at the event its slope there is rounding, and Newton's method may fail at the
+    zero of a sign that is none.
+    """
+    left = (1.0 - share) * (after.arc - before.arc)
+    return left < SAME_FOLD and 0.5 * abs(after.slope) * left < SAME_VALUE * settings.width
 
 
 def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings: Settings) -> bool:

@@ -49,10 +49,16 @@ def symmetrised(orbit: Orbit, farthest: float = NEARLY) -> Orbit | None:
     return altered(orbit, system=part, joints=middle)
 
 
-def undoubled_part(orbit: Orbit, active: int) -> Orbit | None:
-    """Return the orbit of half the period that an orbit has come to; None if far."""
-    part = undoubled(orbit)
-    return None if part is None else solved_at_vertex(part, active)
+def undoubled_part(orbit: Orbit, active: int, farthest: float = NEARLY) -> Orbit | None:
+    """Return the orbit of half the period that an orbit has come to; None if far.
+
+    At a fold at which holds turn by themselves orbits of any number of turns meet: it is that of one turn.
+    """
+    part = undoubled(orbit, farthest)
+    solved = None if part is None else solved_at_vertex(part, active)
+    if solved is None or not solved.system.holds:
+        return solved
+    return undoubled_part(solved, active, _ODD) or solved
 
 
 def undoubled(orbit: Orbit, farthest: float = NEARLY) -> Orbit | None:

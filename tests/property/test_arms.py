@@ -14,6 +14,7 @@ from contfric.continuation.arms import arms_at, passages, turning_passages
 from contfric.continuation.events import Kind
 from contfric.continuation.points import settings_of
 from contfric.continuation.sequences import count, lengths
+from contfric.continuation.vertices import undoubled_part
 from contfric.orbit.apart import cyclic_apart, farthest_apart
 from contfric.orbit.linear import assembled
 
@@ -128,3 +129,27 @@ def test_joints_in_another_order_are_another_motion(seed: int) -> None:
     assert cyclic_apart(joints, other, free) > 0.0
     brute = min(np.max(np.abs(joints - np.roll(other, k, axis=0))) for k in range(6))
     assert cyclic_apart(joints, other, free) == pytest.approx(brute)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_turns_next_to_a_fold_are_those_of_one(seed: int) -> None:
+    """Where orbits of four turns meet a fold they are one turn: of two turns it would be another event."""
+    rng = np.random.default_rng(seed)
+    found = restarts.scene(51, 39)
+    vary, bounds = found.vary, found.range
+    params = {k: v * rng.uniform(0.99, 1.01) for k, v in found.params.items()}
+    diagram = cf.explore(
+        cf.find_orbit("coulomb", params, longest=1000), vary, bounds, max_periods=1
+    )
+    folds = [arms for b in _folds(diagram) if not (arms := arms_at(b.orbit)).unit.half]
+    assert folds
+    parts = []
+    for arms in folds:
+        near = arms.beside(
+            10.0 ** rng.uniform(-7.5, -6.2), settings_of(arms.fold, vary, bounds, None, False, 1000)
+        )
+        for sequence in ((0, 0, 0, 1), (0, 0, 1, 1)) if near else ():
+            part = undoubled_part(near.orbit(sequence), arms.fold.model.index_of(vary))
+            parts += [] if part is None else [part.periods // arms.fold.periods]
+    assert parts
+    assert set(parts) == {1}

@@ -1,0 +1,66 @@
+"""A fold that a slope of rounding seems to have at a sliding event is none, even where Newton fails at it.
+
+Where curves of orbits cross at the end of a bridge the parameter stands, and its slope has either sign there.
+Of bridges of random cases the last step is taken with slopes of either sign at the event, and Newton's method
+is made to fail between: nothing is reported. One that turns before is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.base.attributes import altered
+from contfric.continuation import resolve, smooth
+from contfric.continuation.events import Kind
+
+RANGE = (-0.39, -0.15)
+
+
+def _scene(seed):
+    rng = np.random.default_rng(seed)
+    near = {"Omega": 1.0 / 3.0, "S": 0.49, "S0": 0.997, "h": -0.295}
+    return {k: v * rng.uniform(0.97, 1.03) for k, v in near.items()} | {
+        "zeta": rng.uniform(0.03, 0.07)
+    }
+
+
+def _last_steps(monkeypatch, seed):
+    """Return what the last steps of bridges are asked with that end where their parameter stands."""
+    asked = []
+
+    def smooth_events(orbit, before, after, settings, beyond):
+        if orbit.system.holds and beyond is not after and before.arc < beyond.arc:
+            asked.append((orbit, before, after, settings, beyond))
+        return smooth.smooth_events(orbit, before, after, settings, beyond)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(resolve, "smooth_events", smooth_events)
+        cf.explore(cf.find_orbit("coulomb", _scene(seed)), "h", RANGE, max_periods=2)
+    return [step for step in asked if abs(step[4].slope) < 1e-8 and abs(step[1].slope) > 1e-5]
+
+
+def _folds(step, slope, turns=False):
+    orbit, before, after, settings, event = step
+    base = len(event.tests) - smooth.EXTRA
+    direction, tests, w = event.direction.copy(), event.tests.copy(), event.w.copy()
+    direction[0] = tests[base] = slope
+    if turns:  # the parameter as well
+        w[0] = before.value + 0.5 * (before.slope + slope) * (event.arc - before.arc)
+    event = altered(event, direction=direction, tests=tests, w=w)
+    found = smooth.smooth_events(orbit, before, after, settings, event)
+    return [bifurcation for bifurcation, _ in found if bifurcation.kind is Kind.SN]
+
+
+@pytest.mark.parametrize("seed", [2, 16, 24, 26])
+def test_no_fold_at_an_event_at_which_the_parameter_stands(monkeypatch, seed):
+    steps = _last_steps(monkeypatch, seed)
+    assert steps
+    monkeypatch.setattr(smooth, "locate_change", lambda *_: None)
+    rng = np.random.default_rng(seed)
+    for step in steps:
+        rounding = -np.sign(step[1].slope) * 10.0 ** rng.uniform(-12.0, -8.0)
+        assert not _folds(step, rounding)
+        if abs(step[1].slope) * (step[4].arc - step[1].arc) > 1e-6:  # else it does not turn visibly
+            assert _folds(step, -0.9 * step[1].slope, turns=True)
