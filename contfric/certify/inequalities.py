@@ -101,7 +101,8 @@ def inequalities(
     model, segments = chain.model, chain.segments
     met = touch.condition if touch else None
     still = met.segment if met and met.before else -1
-    known = zeros_at_joints(segments, model, closing, rows_met(met, segments, model), still)
+    more = rows_met(met, segments, model)
+    known = zeros_at_joints(segments, model, closing, more, still)
     surfaces = [s.name for s in system.model.surfaces]
     for i in range(segments.count) if only is None else sorted(only):
         move = chain.move(i, joints)
@@ -123,6 +124,7 @@ def inequalities(
                 or segments.pins[(i + 1) % segments.count] == surface
                 or name in loose
                 or (i == still - 1 and in_span(model.rows[surface], known[still]))
+                or in_span(model.rows[surface], more.get(i, []))
             )
             order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
             if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
@@ -140,9 +142,9 @@ def inequalities(
             yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros, touch)
     for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
-        both = still >= 0 and found.what == JOINT  # at the two ends of a segment without duration
-        both = both and found.segment in (still - 1, still)
-        if both and in_span(model.rows[found.surface], known[still]):
+        at_event = list(more.get(found.segment, []))  # rows that vanish because it is one
+        at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
+        if found.what == JOINT and in_span(model.rows[found.surface], at_event):
             continue
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found

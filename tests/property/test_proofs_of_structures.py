@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -11,9 +12,9 @@ import pytest
 from flint import arb, arb_mat
 
 import contfric as cf
+from contfric.certify import sign
 from contfric.certify.chain import segments_of
 from contfric.certify.closing import is_symmetry
-from contfric.certify.sign import Path, positive
 from contfric.certify.verdict import Verdict
 from contfric.models.balls.build import ball_model
 
@@ -27,7 +28,9 @@ def test_a_violation_is_one_of_all_solutions_only_while_all_of_them_last(seed: i
     later, earlier = a * (1 + rng.uniform(0.01, 1)), a * rng.uniform(0.1, 0.9)
 
     def verdict(longest: float, shortest: float) -> Verdict:
-        return positive(Path(field, start, arb(longest), arb(shortest)), row, 0, 0).verdict
+        return sign.positive(
+            sign.Path(field, start, arb(longest), arb(shortest)), row, 0, 0
+        ).verdict
 
     assert verdict(later, earlier) is Verdict.UNDECIDED
     assert verdict(2 * later, later) is Verdict.REFUTED
@@ -103,7 +106,7 @@ def test_where_a_slider_begins_to_slip_is_proved_and_is_where_the_linear_respons
 def test_the_branch_of_a_contact_that_never_slips_is_proved_up_to_its_event() -> None:
     branch, _ = stuck(0)
     near = float(branch.values[-1])
-    low = near - 0.02 if branch.ends[1].reason.name != "RANGE" else near
+    low = near - 0.006 if branch.ends[1].reason.name != "RANGE" else near
     piece = cf.continue_orbit(branch[len(branch) - 3], "W", (low, 3.0))
     proof = piece.certify()
     assert proof.proved, proof.gaps
@@ -199,3 +202,49 @@ def test_two_contacts_that_change_at_once_are_where_their_times_meet(seed: int) 
             assert abs(where - float(proof.value.mid())) < 1e-4 * max(map(abs, np.diff(values)))
             found += 1
     assert found
+
+
+# --------------------------------------------------------------- kicks
+
+CLOCK = """
+name: kicked
+states: [x, v]
+parameters: {f: 0.1, J: 1.0, c: 0.05}
+autonomous: true
+surfaces:
+  middle: {observable: x}
+  stop: {observable: v, sliding: filippov}
+field: {x: v, v: -x - 2*c*v - f*sign(v)}
+modes:
+  forth: {in: {stop: +}}
+  back: {in: {stop: -}}
+resets: {middle: {v: v + J, from: [forth]}}
+"""
+
+
+def test_a_kick_that_is_just_reached_is_proved_and_so_is_the_branch_to_it(tmp_path: Path) -> None:
+    """Speed and place of the gate vanish together; the branch bends much between its last points."""
+    (tmp_path / "kicked.yaml").write_text(CLOCK, encoding="utf-8")
+    orbit = cf.find_orbit(cf.load_model(tmp_path / "kicked.yaml"))
+    branch = cf.continue_orbit(orbit, "f", (0.05, 0.2))
+    grazing = next(event for event in branch.bifurcations if event.kind == "GS")
+    proof = grazing.certify()
+    assert proof.proved, proof.why
+    assert proof.value is not None
+    with mpmath.workdps(50):
+        c, kick = mpmath.mpf(0.05), mpmath.mpf(1)
+        w = mpmath.sqrt(1 - c * c)
+        less = mpmath.exp(-c * mpmath.pi / w)  # what is left of an amplitude after half a swing
+
+        def place(f: mpmath.mpf) -> mpmath.mpf:
+            """Where the third half swing after a kick ends."""
+            t = mpmath.atan2(kick * w, f + c * kick) / w  # v = 0
+            first = mpmath.exp(-c * t) * (
+                f * mpmath.cos(w * t) + (kick + c * f) / w * mpmath.sin(w * t)
+            )
+            second = f - (first - 2 * f) * less
+            return -f - (second + f) * less
+
+        exact = mpmath.findroot(place, mpmath.mpf(grazing.params["f"]))
+        assert abs(exact - mpmath.mpf(proof.value.mid().str(40, radius=False))) < 1e-30
+    assert branch.certify().covered > 0.9999
