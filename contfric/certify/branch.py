@@ -217,7 +217,8 @@ def certify_branch(
     >>> certify_branch(cf.continue_orbit(orbit, "Omega", (0.495, 0.505))).proved
     True
     """
-    proofs = [certify_event(event, branch.parameter, until) for event in branch.bifurcations]
+    like = branch[len(branch) // 2]
+    proofs = [certify_event(event, branch.parameter, until, like) for event in branch.bifurcations]
     points = []
     for orbit in branch:
         if time.time() > until:

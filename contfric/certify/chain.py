@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
+from contfric.certify.kept import Kept, keep_residual, keep_rows
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, zeros
 from contfric.orbit.holds import holds_of
@@ -41,6 +42,8 @@ class Segments:
     resets : surface of the reset that each segment begins behind; empty without one
     closure : state matrix of the closure, whole numbers or floats
     turn : duration of a turn in periods of the excitation; 0 without excitation
+    kept : what it keeps, in the place of one equation each
+    images : surfaces and those that they are after half a turn, of a half problem
     """
 
     modes: tuple[str, ...]
@@ -49,6 +52,8 @@ class Segments:
     resets: tuple[str, ...]
     closure: tuple[tuple[float, ...], ...]
     turn: float
+    kept: tuple[Kept, ...] = ()
+    images: tuple[tuple[str, str], ...] = ()
 
     @property
     def count(self) -> int:
@@ -79,6 +84,7 @@ def segments_of(system: System) -> Segments:
         tuple(names[r] if r >= 0 else "" for r in layout.resets),
         tuple(tuple(float(c) for c in row) for row in layout.closure),
         float(layout.turn),
+        images=tuple(model.symmetry.surfaces.items()) if system.half and model.symmetry else (),
     )
 
 
@@ -156,17 +162,14 @@ class Chain:
         return [*z, self._closed(z[0])]
 
     def _closed(self, first: Vector) -> Vector:
-        time, turn = arb(0), self.segments.turn
-        if turn != 0.0:
-            time = first[0] + arb(turn) * self.model.period
+        turn = self.segments.turn
+        time = first[0] + arb(turn) * self.model.period if turn != 0.0 else arb(0)
         return [time, *self.closed_change(first)[1:]]
 
     def closed_change(self, first: Vector) -> Vector:
         """Return the closure of a disturbance of the first joint."""
-        rows = self.segments.closure
-        state = [
-            sum((arb(c) * y for c, y in zip(row, first[1:], strict=True)), arb(0)) for row in rows
-        ]
+        lines = [zip(row, first[1:], strict=True) for row in self.segments.closure]
+        state = [sum((arb(c) * y for c, y in pairs), arb(0)) for pairs in lines]
         return [first[0] if self.segments.turn != 0.0 else arb(0), *state]
 
     def move(self, i: int, z: list[Vector]) -> Move:
@@ -209,7 +212,7 @@ class Chain:
             found += [end[j, 0] - z[i + 1][1 + j] for j in range(self.n)]
             at, row, _ = self.condition(i)
             found.append((row * column(self.model.extended(z[at][0], z[at][1:])))[0, 0])
-        return found
+        return keep_residual(self.segments.kept, found, x)
 
     # ------------------------------------------------------------------ first derivatives
 
@@ -231,7 +234,7 @@ class Chain:
             self._by_parameter(i, z, move, rows[first : first + self.n])
             value, rows[first + self.n] = self.observed(z, *self.condition(i), sigma)
             residual.append(value)
-        return residual, rows
+        return keep_residual(self.segments.kept, residual, x), keep_rows(self.segments.kept, rows)
 
     def observed(
         self, z: list[Vector], at: int, row: arb_mat, slope: arb_mat | None, sigma: int = 1
@@ -362,7 +365,7 @@ class Chain:
             disturbed = column(self._disturbed(t, change))
             mixed = column([change[0] * c for c in model.by_parameter(t, 1)])
             last[-1] += (slope * disturbed + row * mixed)[0, 0]
-        return rows
+        return keep_rows(self.segments.kept, rows, 2)
 
     def _disturbed(self, t: arb, change: Vector) -> Vector:
         """Return what a disturbance of a joint changes in the extended state."""

@@ -23,7 +23,7 @@ from contfric.certify.bounds import regular_along
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
 from contfric.certify.monodromy import monodromy
-from contfric.certify.multipliers import dimension, poincare_map
+from contfric.certify.multipliers import dimension, poincare_map, restricted
 from contfric.certify.tube import Box
 from contfric.certify.zeros import Closing, zeros_at_joints
 from contfric.models.balls.numbers import Vector
@@ -58,6 +58,8 @@ def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> b
         return True
     if segments.turn != 0.0:
         found = monodromy(chain, joints)
+        if found is not None and segments.kept:
+            found = restricted(found, [one.row for one in segments.kept])
     else:  # where a multiplier 1 belongs to each orbit, which the Poincare map does not have
         found = poincare_map(chain, joints, known)
     return found is not None and no_pair(found)

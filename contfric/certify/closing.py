@@ -47,11 +47,18 @@ def closing_of(segments: Segments, model: BallModel, half: bool) -> Closing:
 def is_symmetry(orbit: Orbit, segments: Segments, model: BallModel) -> bool:
     """Tell whether the declared symmetry of a half problem is one, exactly.
 
-    Of a model with slopes that are exact too, over the ball of the parameter, it is one for all its values.
+    It is shown by the formulas of the model, for all parameters; or by its matrices where they are exact:
+    with slopes that are exact too, over the ball of the parameter, for all its values.
     """
     symmetry = orbit.model.symmetry
     if symmetry is None or symmetry.fraction != 0.5 or orbit.periods % 2 == 0 or model.resets:
         return False
+    if model.mirrored is not None:
+        image = mirror_mode(orbit.model)
+        modes = tuple((mode, image[mode]) for mode in dict.fromkeys(segments.modes))
+        surfaces = tuple((a, b, int(symmetry.sense(a))) for a, b in symmetry.surfaces.items())
+        if model.mirrored(segments.closure, modes, surfaces):
+            return True
     if model.slopes is not None and not keeps(orbit.system, segments, model, model.slopes):
         return False
     return keeps(orbit.system, segments, model, model)

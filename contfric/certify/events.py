@@ -13,7 +13,6 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from flint import arb, arb_mat
 
 from contfric.base.shown import Shown
@@ -22,12 +21,15 @@ from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.extended import (
     Builder,
     at_joint,
+    null_vector,
+    pair_of,
     rows_of,
     touched_within,
     with_multiplier,
     with_pair,
 )
-from contfric.certify.inequalities import Touch, inequalities
+from contfric.certify.inequalities import Touch, grazes_at_end, inequalities
+from contfric.certify.kept import Kept, with_kept
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
 from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
@@ -36,8 +38,7 @@ from contfric.continuation.touching import rest_at
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, column, row_norm, working
-from contfric.models.definition import FloatArray
+from contfric.models.balls.numbers import Vector, around, column, row_norm, working
 from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 
@@ -82,6 +83,8 @@ class EventCertificate(Shown):
         Its orbit on the shortest problem, and what vanishes there.
     zero : tuple of arb
         The zero of the extended system: joints, what the event needs next to them, the parameter.
+    kept : tuple of Kept
+        What all orbits meant here keep: that of a contact that never slips.
     ended : bool
         Whether a time limit ended the work before anything was known.
     """
@@ -95,6 +98,7 @@ class EventCertificate(Shown):
     admissible: Finding
     location: EventPlace | None = None
     zero: tuple[arb, ...] = ()
+    kept: tuple[Kept, ...] = ()
     ended: bool = False
 
     @property
@@ -145,7 +149,7 @@ class EventCertificate(Shown):
 
 
 def certify_event(
-    event: Bifurcation, parameter: str = "", until: float = math.inf
+    event: Bifurcation, parameter: str = "", until: float = math.inf, like: Orbit | None = None
 ) -> EventCertificate:
     """Prove what can be proved of an event.
 
@@ -153,6 +157,7 @@ def certify_event(
     ----------
     parameter : that is free; by default the one along which the event was located
     until : when to end, by ``time.time``: within one step of Newton's method, or one inequality
+    like : an orbit that keeps what the event's does, where a contact never slips; by default that one
 
     Raises
     ------
@@ -178,7 +183,8 @@ def certify_event(
         location = location_of(event)
         for bits in _BITS:
             with working(bits):
-                found = _attempt(event, location, parameter, bits, until)
+                segments = _segments(event, location, parameter, like or event.orbit)
+                found = _attempt(event, location, segments, (parameter, bits), until)
             if found.proved:
                 break
     except NotLocatedError as error:
@@ -193,11 +199,32 @@ def _undecided(event: Bifurcation, parameter: str, why: str) -> EventCertificate
     return EventCertificate(event, parameter, None, finding, finding, finding, finding)
 
 
+def _segments(event: Bifurcation, location: EventPlace, parameter: str, like: Orbit) -> Segments:
+    """Return the chain of an event, with what it keeps: where the orbits about the event keep it, too."""
+    value = arb(event.params[parameter])
+    near = around(value, arb(_off(event, parameter)))
+    wide = ball_model(event.orbit.model, dict(event.params), parameter, near)
+    own, short = (
+        with_kept(segments_of(orbit.system), wide, like.joints[0])
+        for orbit in (event.orbit, location.orbit)
+    )
+    return short if len(own.kept) == len(short.kept) else replace(short, kept=())
+
+
+def _off(event: Bifurcation, parameter: str) -> float:
+    """Return how far an event may be from where it is printed."""
+    return ACCURACY * (1.0 + abs(event.params[parameter]))
+
+
 def _attempt(
-    event: Bifurcation, location: EventPlace, parameter: str, bits: int, until: float
+    event: Bifurcation,
+    location: EventPlace,
+    segments: Segments,
+    asked: tuple[str, int],
+    until: float,
 ) -> EventCertificate:
-    orbit = location.orbit
-    segments = segments_of(orbit.system)
+    """Try with the parameter and the bits that are asked for."""
+    (parameter, bits), orbit = asked, location.orbit
     params = dict(event.params)
 
     def build(value: arb) -> BallModel:  # for each evaluation of the equations
@@ -214,7 +241,7 @@ def _attempt(
     if orbit.system.half and not is_symmetry(orbit, segments, between):
         return _undecided(event, parameter, "the symmetry is not exact")
     off = float(abs(value.mid() - arb(params[parameter])).upper())
-    if off > ACCURACY * (1.0 + abs(params[parameter])):
+    if off > _off(event, parameter):
         return _undecided(event, parameter, f"the extended system leads {off:.1e} away")
     chain = Chain(segments, build(value))
     touch = _touch(location, inclusion)
@@ -228,6 +255,7 @@ def _attempt(
         _admissible(orbit, chain, z, touch, until),
         location,
         tuple(inclusion.zero),
+        segments.kept,
     )
 
 
@@ -309,10 +337,12 @@ def _of_kind(
     if touch is None or event.kind is Kind.T:
         return Finding(Verdict.PROVED)
     condition = touch.condition
-    if condition.rate or condition.within or condition.departs:
+    if condition.rate or condition.within or condition.departs or condition.before:
         return Finding(Verdict.PROVED)
     test = EventFunction(Margin.JOINT, condition.segment, condition.surface)
     resting = rest_at(test, location.orbit)
+    if event.kind is Kind.GS and grazes_at_end(condition, chain.segments, chain.model):
+        return Finding(Verdict.PROVED)
     if resting is None:
         proved = event.kind is Kind.CS
         return Finding(Verdict.PROVED if proved else Verdict.UNDECIDED, "nothing rests there")
@@ -339,33 +369,3 @@ def _admissible(
         _check_time(until)
         found.append(inequality.named(orbit.system))
     return all_of(found)
-
-
-def null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
-    """Return the unit vector that the linearised chain at the printed orbit maps nearest to zero."""
-    return [arb(float(x)) for x in np.linalg.svd(_linearised(orbit, segments, sigma))[2][-1]]
-
-
-def pair_of(orbit: Orbit, segments: Segments) -> tuple[Vector, Vector]:
-    """Return about (a, b, c, s) of a pair of multipliers ``c +- i s`` near the circle, and a functional.
-
-    The disturbance ``a + i b`` is turned so that a and b are orthogonal; the functional is 1 of a, 0 of b.
-    """
-    plus, minus = (_linearised(orbit, segments, sigma) for sigma in (1, -1))
-    mu = orbit.turn_multipliers
-    upper = mu[mu.imag > 0]
-    near = complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))]) if len(upper) else 1j
-    near /= abs(near)
-    vector = np.linalg.svd((plus + minus) / 2 + near * (plus - minus) / 2)[2][-1].conj()
-    vector = vector * np.exp(-0.5j * np.angle(np.sum(vector * vector)))
-    a, b = vector.real, vector.imag
-    length = float(np.linalg.norm(a))
-    start = [*(a / length), *(b / length), near.real, near.imag]
-    return [arb(float(x)) for x in start], [arb(float(x)) for x in a / length]
-
-
-def _linearised(orbit: Orbit, segments: Segments, sigma: int) -> FloatArray:
-    model = ball_model(orbit.model, orbit.params)
-    printed = [arb(float(x)) for x in orbit.joints.ravel()]
-    _, rows = Chain(segments, model).linearised(printed, sigma)
-    return np.array([[float(x.mid()) for x in row] for row in rows])

@@ -3,6 +3,7 @@ r"""Events as regular zeros of extended systems, with one parameter p free.
 The unknowns are the joints z of the chain ``F(z, p) = 0``, p, and what the event needs in addition:
 
 * an observable g on a surface, or a rate that vanishes, at a joint: ``g(z_k, p) = 0``;
+* a segment without duration: ``t_{i+1} = t_i``;
 * a touch inside of a segment, a time tau after its start: ``q(tau) = 0, q'(tau) = 0``;
 * a multiplier 1 (SN) or -1 of a turn (PD; BP of the half of a symmetric orbit), with its disturbance phi:
   ``F_z phi = 0, c phi = 1``, the closure of phi with the sign of the multiplier (G. Moore and A. Spence,
@@ -24,12 +25,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from flint import arb, arb_mat
 
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.krawczyk import Equations
+from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.models.definition import FloatArray
+from contfric.orbit.orbit import Orbit
 
 #: Returns the model at a value of the free parameter.
 Builder = Callable[[arb], BallModel]
@@ -45,6 +50,8 @@ class EventCondition:
     surface : the surface whose observable is meant
     rate : whether the rate of the observable along the segment is meant, at its end
     within : whether it is touched inside of the segment; else it is met at its end
+    before : exit of the segment before, if the duration of the segment is meant: two contacts change at once;
+        empty for others
     departs : mode along which the rate of the observable is meant in the place of it: the acceleration with
         which a hold would be left, or the rate of the load where rest begins; empty for the observable
     """
@@ -54,6 +61,7 @@ class EventCondition:
     rate: bool = False
     within: bool = False
     departs: str = ""
+    before: str = ""
 
 
 def rows_of(
@@ -76,12 +84,24 @@ def at_joint(segments: Segments, build: Builder, condition: EventCondition) -> E
         model = build(x[-1])
         chain = Chain(segments, model)
         residual, rows = chain.linearised(x[:-1])
-        row, slope = rows_of(model, segments, condition, int(condition.rate))
         joints = chain.joints(x[:-1])
+        if condition.before:
+            value, last = _duration(chain, joints, condition.segment)
+            return [*residual, value], arb_mat([*rows, last])
+        row, slope = rows_of(model, segments, condition, int(condition.rate))
         value, last = chain.observed(joints, condition.segment + 1, row, slope)
         return [*residual, value], arb_mat([*rows, last])
 
     return equations
+
+
+def _duration(chain: Chain, joints: list[Vector], i: int) -> tuple[arb, Vector]:
+    """Return the duration of a segment, and its derivatives by the unknowns and the parameter."""
+    found = []
+    for k in range(chain.size + 1):
+        unit = [arb(int(j == k)) for j in range(chain.size + 1)]
+        found.append(chain.times_by(i + 1, unit) - chain.times_by(i, unit))
+    return chain.duration(i, joints), found
 
 
 def touched_within(segments: Segments, build: Builder, condition: EventCondition) -> Equations:
@@ -182,3 +202,33 @@ def with_pair(segments: Segments, build: Builder, functional: Vector) -> Equatio
         return residual, arb_mat(matrix)
 
     return equations
+
+
+def null_vector(orbit: Orbit, segments: Segments, sigma: int) -> Vector:
+    """Return the unit vector that the linearised chain at the printed orbit maps nearest to zero."""
+    return [arb(float(x)) for x in np.linalg.svd(_linearised(orbit, segments, sigma))[2][-1]]
+
+
+def pair_of(orbit: Orbit, segments: Segments) -> tuple[Vector, Vector]:
+    """Return about (a, b, c, s) of a pair of multipliers ``c +- i s`` near the circle, and a functional.
+
+    The disturbance ``a + i b`` is turned so that a and b are orthogonal; the functional is 1 of a, 0 of b.
+    """
+    plus, minus = (_linearised(orbit, segments, sigma) for sigma in (1, -1))
+    mu = orbit.turn_multipliers
+    upper = mu[mu.imag > 0]
+    near = complex(upper[np.argmin(np.abs(np.abs(upper) - 1.0))]) if len(upper) else 1j
+    near /= abs(near)
+    vector = np.linalg.svd((plus + minus) / 2 + near * (plus - minus) / 2)[2][-1].conj()
+    vector = vector * np.exp(-0.5j * np.angle(np.sum(vector * vector)))
+    a, b = vector.real, vector.imag
+    length = float(np.linalg.norm(a))
+    start = [*(a / length), *(b / length), near.real, near.imag]
+    return [arb(float(x)) for x in start], [arb(float(x)) for x in a / length]
+
+
+def _linearised(orbit: Orbit, segments: Segments, sigma: int) -> FloatArray:
+    model = ball_model(orbit.model, orbit.params)
+    printed = [arb(float(x)) for x in orbit.joints.ravel()]
+    _, rows = Chain(segments, model).linearised(printed, sigma)
+    return np.array([[float(x.mid()) for x in row] for row in rows])

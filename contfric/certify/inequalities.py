@@ -19,7 +19,7 @@ from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import EventCondition
 from contfric.certify.sign import Path, positive, touched, undecided
 from contfric.certify.verdict import Finding, Verdict
-from contfric.certify.zeros import Closing, at_start, order_at_start, zeros_at_joints
+from contfric.certify.zeros import Closing, at_start, in_span, order_at_start, zeros_at_joints
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.system import System
@@ -99,11 +99,16 @@ def inequalities(
     only : segments whose inside is looked at; all if it is not given
     """
     model, segments = chain.model, chain.segments
-    known = zeros_at_joints(segments, model, closing, _met(touch, segments.modes, model))
+    met = touch.condition if touch else None
+    still = met.segment if met and met.before else -1
+    more = rows_met(met, segments, model)
+    known = zeros_at_joints(segments, model, closing, more, still)
     surfaces = [s.name for s in system.model.surfaces]
     for i in range(segments.count) if only is None else sorted(only):
         move = chain.move(i, joints)
         duration = joints[i + 1][0] - joints[i][0]
+        if touch and touch.condition.before and touch.condition.segment == i:
+            continue  # it has no duration
         if not duration > 0:
             verdict = Verdict.REFUTED if duration < 0 else Verdict.UNDECIDED
             found = Inequality(i, segments.exits[i], DURATION, Finding(verdict, "not positive"))
@@ -111,13 +116,15 @@ def inequalities(
                 yield found
                 continue
         zeros = at_start(segments, model, i, known[i])
-        path = Path(move.field, move.start, duration.upper())
+        path = Path(move.field, move.start, duration.upper(), duration.lower())
         for surface, sign in _inside(system, i, surfaces):
-            row = model.surfaces[surface] * sign
-            ends = (
+            row, name = model.surfaces[surface] * sign, InequalityName(i, surface, JOINT)
+            ends = bool(
                 segments.exits[i] == surface
                 or segments.pins[(i + 1) % segments.count] == surface
-                or InequalityName(i, surface, JOINT) in loose
+                or name in loose
+                or (i == still - 1 and in_span(model.rows[surface], known[still]))
+                or in_span(model.rows[surface], more.get(i, []))
             )
             order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
             if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
@@ -126,7 +133,7 @@ def inequalities(
                 continue
             if _is_event(touch, i, surface):
                 finding = touched(path, row, order, touch.after if touch is not None else None)
-            elif _is_left_held(segments, i, surface):
+            elif _is_left_held(segments, i, surface) or _grazes_at(touch, i, surface, chain):
                 finding = touched(path, row, order, None)
             else:
                 bends = InequalityName(i, surface, EXIT) in loose
@@ -135,6 +142,10 @@ def inequalities(
             yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros, touch)
     for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
+        at_event = list(more.get(found.segment, []))  # rows that vanish because it is one
+        at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
+        if found.what == JOINT and in_span(model.rows[found.surface], at_event):
+            continue
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
 
@@ -148,28 +159,48 @@ def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
     return (touch.condition.segment, touch.condition.surface) == (i, surface)
 
 
+def _grazes_at(touch: Touch | None, i: int, surface: str, chain: Chain) -> bool:
+    """Tell whether the event is that a segment touches a surface at its end."""
+    if touch is None or (touch.condition.segment, touch.condition.surface) != (i, surface):
+        return False
+    return grazes_at_end(touch.condition, chain.segments, chain.model)
+
+
+def grazes_at_end(condition: EventCondition, segments: Segments, model: BallModel) -> bool:
+    """Tell whether an observable that vanishes at a joint is stationary there, as its rate is the exit."""
+    if condition.rate or condition.within or condition.departs or condition.before:
+        return False
+    i, surface = condition.segment, condition.surface
+    mode, exit_ = segments.modes[i], segments.exits[i]
+    if model.alike is not None and model.alike(surface, mode) == exit_:
+        return True
+    return bool(exit_) and in_span(model.rate(surface, mode), [model.rows[exit_]])
+
+
 def _is_left_held(segments: Segments, i: int, surface: str) -> bool:
     """Tell whether a segment ends with a touch, at which a hold begins."""
     pin = segments.pins[(i + 1) % segments.count]
     return isinstance(pin, tuple) and segments.exits[i] == surface
 
 
-def _met(touch: Touch | None, modes: tuple[str, ...], model: BallModel) -> dict[int, list[Vector]]:
+def rows_met(
+    condition: EventCondition | None, segments: Segments, model: BallModel
+) -> dict[int, list[Vector]]:
     """Return the rows that vanish at the ends of segments at an event, in addition to the exits."""
-    if touch is None or touch.condition.within:
+    if condition is None or condition.within:
         return {}
-    met = touch.condition
-    if met.departs:
-        return {met.segment: [model.rate(met.surface, met.departs)]}
-    if not met.rate:
-        return {met.segment: [model.rows[met.surface]]}
-    return {met.segment: [model.rate(met.surface, modes[met.segment])]}
+    i, surface = condition.segment, condition.surface
+    if condition.before:  # both of its ends are one point
+        return {i - 1: [model.rows[surface]]}
+    if condition.departs or condition.rate:
+        return {i: [model.rate(surface, condition.departs or segments.modes[i])]}
+    return {i: [model.rows[surface]]}
 
 
 def _is_of(met: EventCondition, found: Inequality) -> bool:
     """Tell whether an inequality at a joint is the one that vanishes at an event."""
     what = EXIT if met.rate else JOINT
-    return not (met.within or met.departs) and (met.segment, met.surface, what) == (
+    return not (met.within or met.departs or met.before) and (met.segment, met.surface, what) == (
         found.segment,
         found.surface,
         found.what,

@@ -67,7 +67,13 @@ def location_of(event: Bifurcation) -> EventPlace:
     orbit, tests = _released(event.orbit, event.tests)
     if not tests:
         return EventPlace(_multiplier_orbit(event), None)
-    orbit, found = _shortest(orbit, tests)
+    try:
+        orbit, found = _shortest(orbit, tests)
+    except NotLocatedError:
+        condition = _two_at_once(orbit) if event.kind in (Kind.CS, Kind.T) else None
+        if condition is None:
+            raise
+        return EventPlace(orbit, condition)
     if len(found) != 1:
         raise NotLocatedError(f"{len(found)} independent conditions meet")
     test = found[0]
@@ -90,6 +96,19 @@ def location_of(event: Bifurcation) -> EventPlace:
             return EventPlace(orbit, _at_stop(orbit, test.segment - 1, test.surface))
         return EventPlace(orbit, EventCondition(test.segment, test.surface, within=True), after)
     raise NotLocatedError(f"events of a margin of the kind '{test.margin.value}' are not proved")
+
+
+def _two_at_once(orbit: Orbit) -> EventCondition | None:
+    """Return that two contacts change at the same time: the only segment that vanishes is the one between."""
+    itinerary, resets = orbit.system.itinerary, orbit.system.layout.resets
+    lasts = orbit.ends[:, 0] - orbit.begins[:, 0]
+    found = [i for i in range(len(itinerary)) if lasts[i] < _VANISHED]
+    if len(found) != 1 or found[0] == 0:
+        return None
+    i = found[0]
+    if max(resets[i], resets[(i + 1) % len(itinerary)]) >= 0:
+        return None
+    return EventCondition(i, itinerary[i][1], before=itinerary[i - 1][1])
 
 
 def _released(
@@ -250,21 +269,24 @@ def _is_symmetric(model: Model, joints: FloatArray, period: float) -> bool:
 
 
 def _tangency(orbit: Orbit, test: EventFunction) -> EventPlace:
-    """Return where a surface of the test's observable is touched: inside of its segment, or at its end."""
-    model = orbit.model
+    """Return where a surface of the test's observable is touched: inside of its segment, or at its ends."""
+    model, count = orbit.model, len(orbit.ends)
+    ends = {test.segment}
+    if (
+        test.segment or not orbit.system.half
+    ):  # else what is before it is the image of another segment
+        ends.add((test.segment - 1) % count)
     names = [s.name for s in model.surfaces if test.surface in (s.name, s.observable)]
-    end = orbit.ends[test.segment]
     found = []
     for name in names:
         gap, after = _nearest_touch(orbit, test.segment, name)
         found.append((gap, EventCondition(test.segment, name, within=True), after))
-        if name != orbit.system.itinerary[test.segment][1]:
-            value = orbit.flow.observe(
-                model.surface_by_name[name].observable, float(end[0]), end[1:]
-            )
-            found.append(
-                (abs(value - orbit.flow.level(name)), EventCondition(test.segment, name), 0.0)
-            )
+        for i in ends:
+            if name != orbit.system.itinerary[i][1]:
+                end, observable = orbit.ends[i], model.surface_by_name[name].observable
+                value = orbit.flow.observe(observable, float(end[0]), end[1:])
+                gap = abs(value - orbit.flow.level(name))
+                found.append((gap, EventCondition(i, name), 0.0))
     gap, condition, after = min(found, key=lambda row: row[0])
     return EventPlace(orbit, condition, after)
 

@@ -16,8 +16,10 @@ from flint import arb, arb_mat
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
-from contfric.certify.extended import Builder, EventCondition
-from contfric.certify.zeros import at_start, in_span, zeros_at_joints
+from contfric.certify.extended import Builder
+from contfric.certify.inequalities import rows_met
+from contfric.certify.kept import Kept
+from contfric.certify.zeros import at_start, closed, in_span, zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
@@ -55,6 +57,8 @@ def as_zero_of(
     if own.model is not system.model or (system.half and not own.half):
         return None
     if system.periods % own.periods:
+        return None
+    if len(segments.kept) != len(proof.kept) or not all(map(Kept.same, segments.kept, proof.kept)):
         return None
     model = build(proof.value)
     for touched in (False, True)[: 1 + _is_within(proof)]:
@@ -106,13 +110,15 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     scale = two_pi / timed.period
     joints = [list(proof.zero[i * m : (i + 1) * m]) for i in range(segments.count)]
     joints = [[joint[0] * scale, *joint[1:]] for joint in joints]
-    met: dict[int, list[Vector]] = {}
     condition = location.condition
-    if condition is not None and not condition.within:
-        met = {condition.segment: [_row(condition, segments, model)]}
+    met = rows_met(condition, segments, model)
     closing = closing_of(segments, model, half)
-    known = zeros_at_joints(segments, model, closing, met)
+    still = condition.segment if condition is not None and condition.before else -1
+    known = zeros_at_joints(segments, model, closing, met, still)
     modes, resets = list(segments.modes), list(segments.resets)
+    if still >= 0:  # both of its ends are one point
+        for values in (joints, known, modes, resets):
+            del values[still]
     if touched and condition is not None:
         i, chain = condition.segment, Chain(segments, model)
         after, mode = proof.zero[-2] * scale, modes[i]
@@ -121,7 +127,9 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
         kept = at_start(segments, model, i, known[i])
         kept = [row for row in kept if in_span(numbers(arb_mat([row]) * move.field), [])]
         joints.insert(i + 1, [joints[i][0] + after, *end[: m - 1]])
-        row = _row(condition, segments, model)
+        row = model.rows[condition.surface]
+        if condition.departs:
+            row = model.rate(condition.surface, condition.departs)
         rate = model.rate(condition.surface, mode)
         if condition.departs:
             rate = numbers(arb_mat([row]) * move.field)
@@ -131,17 +139,17 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     turn = arb(segments.turn) * two_pi
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
-        joints, known = [*joints, *image], [*known, *([closing(r) for r in rows] for rows in known)]
+        joints, known = (
+            [*joints, *image],
+            [
+                *known,
+                *([closed(r, closing, segments, model) for r in rows] for rows in known),
+            ],
+        )
         modes = [mode for mode, _ in orbit.itinerary]
         resets = list(segments_of(orbit.as_whole().system).resets)
         turn = 2 * turn
     return _Cycle(joints, modes, resets, known, turn, orbit.periods)
-
-
-def _row(condition: EventCondition, segments: Segments, model: BallModel) -> Vector:
-    if condition.rate or condition.departs:
-        return model.rate(condition.surface, condition.departs or segments.modes[condition.segment])
-    return model.rows[condition.surface]
 
 
 def _matched(cycle: _Cycle, joint: Vector) -> tuple[int, int] | None:

@@ -8,40 +8,28 @@ r"""Prove a computed orbit.
    with twice the digits.
 
 Where a contact never slips the orbits are a continuum. One of them is proved, alone among those that keep
-the same (below).
+the same (:mod:`contfric.certify.kept`).
 
 The stated error of the joints is what rounding of the flow and the residual do to them:
 ``|C| rho`` with C the inverse of the Jacobian and rho the rounding of one equation.
-
-What an orbit keeps (the offset of a stuck slider) follows from its equations. Let l be a row with
-``l M = 0`` in the mode of every segment, kept by its resets and by the closure. Then l y is the same at all
-joints, whatever it is: the orbits are a continuum, and the chain says ``l y_N = l y_0`` twice. It is given
-once: ``l y_0`` is what the printed joints keep, in the place of the equation of one state at the end of the
-last segment. Nothing is lost: ``l r = 0`` holds for the residual r of that segment, of which all entries
-but that one vanish, so that it vanishes, too. What is proved then is one orbit among those that keep the
-same.
-
-The rows l are sought by elimination in rational numbers, among the states whose rates are known exactly.
-What is not exactly kept counts as not kept.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 
-from flint import acb, arb, arb_mat, fmpq, fmpq_mat
+from flint import acb, arb, arb_mat
 
 from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.inequalities import inequalities
+from contfric.certify.kept import with_kept
 from contfric.certify.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
 from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.certify.zeros import zeros_at_joints
 from contfric.models.balls.build import ball_model
-from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slack import margin_rounding
@@ -117,22 +105,6 @@ def provable_form(orbit: Orbit) -> Orbit:
         return orbit if is_symmetry(orbit, segments_of(orbit.system), model) else orbit.as_whole()
 
 
-def equations_of(
-    segments: Segments, model: BallModel, kept: list[Kept], printed: Vector, x: Vector
-) -> tuple[Vector, arb_mat]:
-    """Return residual and Jacobian of a chain that keeps what the printed joints do."""
-    residual, rows = with_kept(*Chain(segments, model).linearised(x), kept, x, printed)
-    return residual, arb_mat(rows)
-
-
-def residual_of(
-    segments: Segments, model: BallModel, kept: list[Kept], printed: Vector, x: Vector
-) -> Vector:
-    """Return the residual of :func:`equations_of`."""
-    residual = Chain(segments, model).residual(x)
-    return with_kept(residual, [[]] * len(residual), kept, x, printed)[0]
-
-
 def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
     """Return how well each joint of an orbit is known, by its own account."""
     size = 1.0 + float(abs(orbit.joints).max())
@@ -146,8 +118,12 @@ def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
 def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certificate:
     model = ball_model(orbit.model, orbit.params)
     printed = [arb(float(x)) for x in orbit.joints.ravel()]
-    kept = kept_by_chain(segments, model)
-    equations = partial(equations_of, segments, model, kept, printed)
+    segments = with_kept(segments, model, orbit.joints[0])
+
+    def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        residual, rows = Chain(segments, model).linearised(x)
+        return residual, arb_mat(rows)
+
     at_printed = equations(printed)
     inverse = approximate_inverse(at_printed[1])
     if inverse is None:
@@ -158,8 +134,8 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certi
         return _nothing(
             orbit, "no solution so near to the printed joints", bits, Verdict.REFUTED, radii
         )
-    residual = partial(residual_of, segments, model, kept, printed)
-    zero = narrowed(residual, box, printed, radii)
+    chain = Chain(segments, model)
+    zero = narrowed(chain.residual, box, printed, radii)
     if zero is None:
         thin = enclosed(equations, printed, arb(2) ** (_SPARE - bits))
         if thin.verdict is not Verdict.PROVED:
@@ -174,13 +150,12 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certi
         unique = Finding(
             Verdict.UNDECIDED, "the equations are nearly singular over the stated error"
         )
-    chain, admissible = Chain(segments, model), NOT_YET
-    joints = chain.joints(zero)
+    admissible, joints = NOT_YET, chain.joints(zero)
     if inside:
         admissible = _obeys(orbit, chain, joints)
-    discs, stable = _stability(orbit, chain, kept, joints)
+    discs, stable = _stability(orbit, chain, joints)
     return Certificate(
-        orbit, exists, unique, admissible, stable, radii, zero, discs, bits, len(kept)
+        orbit, exists, unique, admissible, stable, radii, zero, discs, bits, len(segments.kept)
     )
 
 
@@ -195,19 +170,17 @@ def _obeys(orbit: Orbit, chain: Chain, joints: list[Vector]) -> Finding:
     return all_of([found.named(orbit.system) for found in every])
 
 
-def _stability(
-    orbit: Orbit, chain: Chain, kept: list[Kept], joints: list[Vector]
-) -> tuple[list[acb], Finding]:
+def _stability(orbit: Orbit, chain: Chain, joints: list[Vector]) -> tuple[list[acb], Finding]:
     """Return discs of the multipliers of the solution with such joints, and whether it is stable."""
     if orbit.system.holds:
         return [], Finding(Verdict.REFUTED, "the least disturbance ends a hold")
     closing = closing_of(chain.segments, chain.model, orbit.system.half)
     known = zeros_at_joints(chain.segments, chain.model, closing)
-    matrix = poincare_map(chain, joints, known, [one.row for one in kept])
+    matrix = poincare_map(chain, joints, known)
     if matrix is None:
         return [], Finding(Verdict.UNDECIDED, "a stop may be tangential")
-    discs = turn_multipliers(matrix, orbit.model.directions - len(kept))
-    return discs, stability(discs)
+    discs = turn_multipliers(matrix, orbit.model.directions - len(chain.segments.kept))
+    return discs, stability(discs, matrix)
 
 
 def _nothing(
@@ -219,70 +192,3 @@ def _nothing(
 ) -> Certificate:
     finding, unknown = Finding(verdict, why), Finding(Verdict.UNDECIDED, "no solution to speak of")
     return Certificate(orbit, finding, unknown, unknown, unknown, radii or [], [], [], bits)
-
-
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """A linear function of the state that an orbit keeps.
-
-    Attributes
-    ----------
-    row : l, by the states
-    state : one with ``l`` = 1 there, in which all others of the same orbit are 0
-    """
-
-    row: Vector
-    state: int
-
-
-def kept_by_chain(segments: Segments, model: BallModel) -> list[Kept]:
-    """Return a basis of the linear functions of the state that a chain keeps at every value of them."""
-    n = segments.states
-    size = model.size
-    matrices = [model.fields[mode] for mode in dict.fromkeys(segments.modes)]
-    for name in dict.fromkeys(name for name in segments.resets if name):
-        matrices.append(_less_identity(model.resets[name]))
-    closure = [[arb(c) for c in row] + [arb(0)] * (size - n) for row in segments.closure]
-    matrices.append(_less_identity(arb_mat(closure)))
-    exact = [k for k in range(n) if all(m[k, j].is_exact() for m in matrices for j in range(size))]
-    # an equation l A = 0 for each column A of them
-    rows = [[_rational(m[k, j]) for k in exact] for m in matrices for j in range(size)]
-    rows = [row for row in rows if any(row)]
-    if not exact or len(rows) == 0:
-        return []
-    reduced, rank = fmpq_mat(rows).rref()
-    pivots = [next(k for k in range(len(exact)) if reduced[i, k] != 0) for i in range(int(rank))]
-    found = []
-    for free in (k for k in range(len(exact)) if k not in pivots):
-        row = [arb(0)] * n
-        row[exact[free]] = arb(1)
-        for i, k in enumerate(pivots):
-            row[exact[k]] = -arb(reduced[i, free])
-        found.append(Kept(row, exact[free]))
-    return found
-
-
-def with_kept(
-    residual: Vector, rows: list[Vector], kept: list[Kept], x: Vector, printed: Vector
-) -> tuple[Vector, list[Vector]]:
-    """Return the equations of a chain that keeps what some printed joints do."""
-    if not kept:
-        return residual, rows
-    residual, rows = list(residual), list(rows)
-    n = len(kept[0].row)
-    for one in kept:
-        at = len(residual) - (n + 1) + one.state
-        pairs = zip(one.row, x[1 : n + 1], printed[1 : n + 1], strict=True)
-        residual[at] = sum((c * (y - p) for c, y, p in pairs), arb(0))
-        rows[at] = [arb(0), *one.row, *[arb(0)] * (len(rows[at]) - n - 1)]
-    return residual, rows
-
-
-def _less_identity(matrix: arb_mat) -> arb_mat:
-    entries = matrix.tolist()
-    return arb_mat([[c - (j == k) for j, c in enumerate(row)] for k, row in enumerate(entries)])
-
-
-def _rational(number: arb) -> fmpq:
-    mantissa, exponent = (int(part) for part in number.mid().man_exp())
-    return fmpq(mantissa) * fmpq(2) ** exponent

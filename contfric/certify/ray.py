@@ -17,6 +17,7 @@ from flint import arb, arb_mat
 
 from contfric.certify.affine import AffineMatrix, enclosing
 from contfric.certify.chain import Chain, Segments, block_exponential
+from contfric.certify.kept import keep_residual, keep_rows
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, around, column, zeros
 
@@ -99,6 +100,11 @@ class Ray:
             residual += self._segment(i)
             at, row, slope = self._condition(i)
             residual.append(self._observed(i * self.m + self.n, at, row, slope))
+        kept = self.segments.kept
+        residual = keep_residual(kept, residual, self.chord.middle)
+        for order, three in ((1, self.own), (2, self.closing)):
+            for k, rows in enumerate(three):
+                keep_rows(kept, rows, max(order, k + 1))
         own, closing = (
             tuple(arb_mat(rows) for rows in three) for three in (self.own, self.closing)
         )

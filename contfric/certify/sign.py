@@ -50,11 +50,26 @@ class Derivatives(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """One segment of a solution: its field, its extended state at the start, its longest duration."""
+    """One segment of the solutions in some balls.
+
+    Attributes
+    ----------
+    field : its field
+    start : the extended state at its start
+    duration : the longest one
+    shortest : the shortest one, up to which a violation is one of all of them; the longest one if it is None
+    """
 
     field: arb_mat
     start: arb_mat
     duration: arb
+    shortest: arb | None = None
+
+    def lasts(self, level: int, index: int) -> bool:
+        """Tell whether all of the solutions last up to the middle of piece ``index`` of 2^level."""
+        if self.shortest is None:
+            return True
+        return bool(self.duration * (2 * index + 1) / 2 ** (level + 1) < self.shortest)
 
     @cached_property
     def weights(self) -> list[arb]:
@@ -217,7 +232,7 @@ def _shown(
 
     def shown(level: int, index: int) -> bool | None:
         value = range_over(path, rows, level, index)
-        if value < 0 or (row * path.middle(level, index))[0, 0] < 0:
+        if (row * path.middle(level, index))[0, 0] < 0 and path.lasts(level, index):
             return False
         at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and end_order > 0
         if value > 0:
@@ -258,7 +273,8 @@ def touched(path: Path, row: arb_mat, start_order: int, after: arb | None) -> Fi
     """
     at = path.duration if after is None else after
     state = (path.field * at).exp() * path.start
-    back = Path(-path.field, state, at.upper())
+    shortest = None if path.shortest is None else arb(0)  # it begins where the longest one ends
+    back = Path(-path.field, state, at.upper(), shortest)
     found = positive(back, row, 2, start_order)
     if after is None or not found.proved:
         return found

@@ -21,6 +21,7 @@ from contfric.certify.chain import Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.events import EventCertificate
 from contfric.certify.extended import Builder
+from contfric.certify.kept import with_kept
 from contfric.certify.meeting import as_zero_of
 from contfric.certify.zeros import in_span
 from contfric.continuation.branch import Branch
@@ -46,11 +47,13 @@ class Strand:
         self.orbit = orbit
         low, high = float(branch.values.min()), float(branch.values.max())
         exact = self._model(arb(low))
-        between = replace(exact, slopes=self._model(arb(low).union(arb(high))).slopes)
+        wide = self._model(arb(low).union(arb(high)))
+        between = replace(exact, slopes=wide.slopes)
         half = branch.system.half
         self.whole = half and not is_symmetry(orbit, segments_of(orbit.system), between)
-        self.system = orbit.as_whole().system if self.whole else orbit.system
-        self.segments: Segments = segments_of(self.system)
+        chosen = orbit.as_whole() if self.whole else orbit
+        self.system = chosen.system
+        self.segments: Segments = with_kept(segments_of(self.system), wide, chosen.joints[0])
         self.build: Builder = self._build
         # the closure is that of whole numbers at every value of the parameter
         self.closes = closing_of(self.segments, self.build(arb(low)), self.system.half)
@@ -189,7 +192,7 @@ def in_phases(model: BallModel) -> BallModel:
         model.resets,
         slopes,
         model.alike,
-        model.fields,
+        unscaled=model.fields,
     )
 
 

@@ -119,8 +119,12 @@ class Tracer(Strand):
 
         That is the next one, or one that is about as far as the last box reached.
         """
-        last = self._reached(k)
-        return self._step(k, last), last
+        last, before = self._reached(k), self.last
+        found = self._step(k, last)
+        if last > k + 1 and not all(piece.exists for piece in found) and self.goes_on():
+            self.last, last = before, k + 1  # no orbit was found halfway: the branch bends much
+            found = self._step(k, last)
+        return found, last
 
     def _reached(self, k: int) -> int:
         """Return the last point up to which a box is tried from point k: one step, or more."""

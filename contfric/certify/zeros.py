@@ -31,20 +31,23 @@ def zeros_at_joints(
     model: BallModel,
     closing: Closing,
     more: dict[int, list[Vector]] | None = None,
+    still: int = -1,
 ) -> list[list[Vector]]:
     """Return the rows that vanish at joints 0 .. N - 1 (before a reset).
 
     Parameters
     ----------
     more : further rows that vanish at the ends of segments
+    still : a segment without duration, if there is one: what vanishes at its start vanishes at its end
     """
     count = segments.count
     found: list[list[Vector]] = [[] for _ in range(count)]
     for i in [*range(count), *range(count)]:  # what the last segment keeps is known after one round
         rows = _at_end(segments, model, (i - 1) % count, found)
         rows += (more or {}).get((i - 1) % count, [])
+        rows += found[still] if still >= 0 and (i - 1) % count == still else []
         if i == 0:
-            rows = [_closed(row, closing) for row in rows]
+            rows = [closed(row, closing, segments, model) for row in rows]
         pin = segments.pins[i]
         if isinstance(pin, str):
             rows.append(model.rows[pin])
@@ -54,8 +57,14 @@ def zeros_at_joints(
     return found
 
 
-def _closed(row: Vector, closing: Closing) -> Vector:
-    """Return the row at the first joint: the same list where the closure changes its sign at most."""
+def closed(row: Vector, closing: Closing, segments: Segments, model: BallModel) -> Vector:
+    """Return the row at the first joint, up to its sign: a list of the model's where that is known.
+
+    It is the same one where the closure changes its sign at most; that of a surface is its image's.
+    """
+    for name, image in segments.images:
+        if row is model.rows[name]:
+            return model.rows[image]
     pairs = []
     for k in (k for k, x in enumerate(row) if not x.is_zero()):
         unit = [arb(int(j == k)) for j in range(len(row))]
@@ -109,8 +118,10 @@ def in_span(row: Vector, rows: list[Vector]) -> bool:
     """
     if any(row is other for other in rows):  # of balls that are not exact, too
         return True
-    left, basis = list(row), [list(other) for other in rows]
-    while basis:
+    # balls that are not exact leave nothing exactly zero: rows of them come last
+    basis = sorted(rows, key=lambda other: all(x.is_exact() for x in other))
+    left = row
+    while basis and not _is_zero(left):
         pivot = basis.pop()
         at = next((k for k, x in enumerate(pivot) if x.is_exact() and not x.is_zero()), None)
         if at is None:

@@ -19,7 +19,7 @@ from flint import arb, arb_mat
 
 from contfric.errors import ParameterError
 from contfric.models.affine import AffineForm
-from contfric.models.balls.model import BallModel
+from contfric.models.balls.model import BallModel, Closure, Pairs, SignedPairs
 from contfric.models.balls.numbers import zeros
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
@@ -138,6 +138,28 @@ def alike(affine: AffineModel, surface: str, mode: str) -> str | None:
     return None
 
 
+@lru_cache(maxsize=256)
+def mirrored(affine: AffineModel, closure: Closure, modes: Pairs, surfaces: SignedPairs) -> bool:
+    """Tell whether a symmetry of half a period maps fields and surfaces to those of the image modes.
+
+    In symbols: ``M' D = K M`` and ``g' D = -g`` or g, D = diag(K, 1, (-1)^n_k), as in
+    :mod:`contfric.certify.closing`.
+    """
+    n, turns = affine.states, affine.turns
+    k = sympy.Matrix(n, n, [sympy.Rational(c) for row in closure for c in row])
+    waves = [(-1) ** turn for turn in turns for _ in range(2)]
+    d = sympy.diag(k, 1, *waves)
+    gaps = [
+        sympy.Matrix(affine.fields[to]) * d - k * sympy.Matrix(affine.fields[mode])
+        for mode, to in modes
+    ]
+    gaps += [
+        sympy.Matrix(affine.surfaces[to]) * d - sign * sympy.Matrix(affine.surfaces[name])
+        for name, to, sign in surfaces
+    ]
+    return all(sympy.expand(x) == 0 for gap in gaps for x in gap)
+
+
 def _affine(formulas: Formulas, texts: list[Any], what: str, name: str) -> list[AffineForm]:
     found = formulas.affine(texts)
     if isinstance(found, str):
@@ -230,6 +252,7 @@ def _evaluated(
         {name: reset(rows) for name, rows in affine.resets.items()},
         slopes,
         partial(alike, affine) if one else None,
+        partial(mirrored, affine) if one else None,
     )
 
 

@@ -22,6 +22,11 @@ from flint import arb, arb_mat
 
 from contfric.models.balls.numbers import Vector, numbers
 
+#: A matrix of states; modes and their images; surfaces, their images and the sign of their observables.
+Closure = tuple[tuple[float, ...], ...]
+Pairs = tuple[tuple[str, str], ...]
+SignedPairs = tuple[tuple[str, str, int], ...]
+
 
 @dataclass(frozen=True, eq=False)
 class BallModel:
@@ -49,6 +54,9 @@ class BallModel:
     alike : callable or None
         Returns the surface whose row is the rate of another one along a mode, or its negative, identically in
         the parameters: balls of the two rows do not show it.
+    mirrored : callable or None
+        Tells whether a symmetry of half a period maps modes and surfaces as it should, identically in the
+        parameters: of a closure, of pairs of modes, and of pairs of surfaces with their signs.
     unscaled : dict
         Fields that are these but for a positive factor of the states, and without its rounding; if there are.
     """
@@ -62,6 +70,7 @@ class BallModel:
     resets: dict[str, arb_mat] = field(default_factory=dict)
     slopes: BallModel | None = None
     alike: Callable[[str, str], str | None] | None = None
+    mirrored: Callable[[Closure, Pairs, SignedPairs], bool] | None = None
     unscaled: dict[str, arb_mat] = field(default_factory=dict)
 
     @cached_property
