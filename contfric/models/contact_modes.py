@@ -29,7 +29,7 @@ from contfric.models.not_affine import NotAffineError
 from contfric.models.shared_loads import Limit, Setting, load_name
 from contfric.models.structure import Structure, defaults_of
 from contfric.models.structure_names import COORDINATES
-from contfric.models.units import read_units
+from contfric.models.units import AUTO, read_units
 
 #: What a model of a structure has of its own; everything else is as in any model.
 KEYS = (COORDINATES, "mass", "damping", "stiffness", "force", "contacts")
@@ -127,6 +127,8 @@ class Combinations:
 
     def _units(self, stretches: Sequence[str]) -> dict[str, Any]:
         """Return the units that are given, and what follows for velocities and stretches."""
+        if self.top.data["units"] == AUTO:
+            return {AUTO: [[*self.coordinates, *stretches], [*self.velocities]]}
         given = mapping_in(self.top.data, "units")
         numbers = read_units(self.top, "units", (*self.coordinates, *self.velocities, *stretches))
         time, lengths = numbers.get("t", 1.0), [numbers.get(q, 1.0) for q in self.coordinates]

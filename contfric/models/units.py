@@ -7,7 +7,11 @@ order 1. So a state of unit U is ``x = U X``, time is ``t = U_t T``, and
     dX/dT = (U_t/U) dx/dt ,    period/U_t ,    X after a reset = (new value)/U .
 
 What is solved, and all that results say of states and times, is in these units; parameters and quantities
-that the file declares stay as they are. Observables are divided by a power of ten near their size.
+that the file declares stay as they are. Observables are divided by their size.
+
+``units: auto`` chooses units by the sizes of states (:mod:`contfric.models.sizes`): then a model in any units
+is solved as the same numbers. Scaling formulas takes the place of a scale in each comparison with 1; there
+are some 170 of these.
 """
 
 from __future__ import annotations
@@ -22,9 +26,12 @@ from contfric.models.description import Description
 from contfric.models.entries import EntryError, Part, mapping_in
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.grammar import TIME, number_of
+from contfric.models.sizes import chosen_units, rounded
 from contfric.models.tied import Substitution
 
 KEY = "units"
+#: Units that are chosen by the sizes of the states.
+AUTO = "auto"
 #: The key of a model that is written out: its formulas are in these units already.
 APPLIED = "in_units"
 #: States at which the sizes of observables are looked at.
@@ -41,7 +48,8 @@ def read_units(top: Part, key: str, states: Sequence[str]) -> dict[str, float]:
     EntryError
         If one is no positive number, or of what is no state.
     """
-    part = top.part(key, "a mapping of states and t to numbers, such as {x: 1.0e-3, t: 0.01}")
+    wanted = "'auto', or a mapping of states and t to numbers, such as {x: 1.0e-3, t: 0.01}"
+    part = top.part(key, wanted)
     part.only((*states, TIME))
     found = {}
     for name, value in part.data.items():
@@ -68,7 +76,14 @@ def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
     EntryError
         If a unit is wrong, or an angle has one.
     """
-    units = read_units(Part(data), KEY, [str(s) for s in data["states"]])
+    given = data.get(KEY)
+    alike = given.get(AUTO) if isinstance(given, Mapping) else None  # of a structure
+    if given == AUTO or alike:
+        plain = read({key: value for key, value in data.items() if key != KEY})
+        spread, angles = [*mapping_in(data, "spread")], Part(data).texts("angles")
+        units = chosen_units(plain, spread, angles, alike or ())
+    else:
+        units = read_units(Part(data), KEY, [str(s) for s in data["states"]])
     if not units:
         return {key: value for key, value in data.items() if key != KEY}
     for angle in Part(data).texts("angles"):
@@ -179,7 +194,7 @@ def _measured(
 
 
 def _sizes(found: Description) -> dict[str, float]:
-    """Return a power of ten near the size of each observable that is no state."""
+    """Return the size of each observable that is no state."""
     params, evaluator = defaults(found), floats(found)
     places = list(Sampler(evaluator, params).states(_SAMPLES))
     sizes = {}
@@ -192,8 +207,7 @@ def _sizes(found: Description) -> dict[str, float]:
             continue  # where it has no value the check of the model says so
         values = [v for v in values if 0.0 < v < math.inf]
         if values:
-            middle = math.exp(sum(map(math.log, values)) / len(values))
-            sizes[observable.name] = 10.0 ** round(math.log10(middle))
+            sizes[observable.name] = rounded(math.exp(sum(map(math.log, values)) / len(values)))
     return {name: size for name, size in sizes.items() if size != 1.0}
 
 
