@@ -329,7 +329,7 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
 def _extent(branch: Branch) -> tuple[float, float]:
     """Return a range around the values of a branch."""
     low, high = float(branch.values.min()), float(branch.values.max())
-    rounding = 1e-9 * (1.0 + abs(low))
+    rounding = 1e-9 * branch.model.size_of(branch.model.index_of(branch.parameter), low)
     return low - rounding, high + rounding
 
 

@@ -151,7 +151,10 @@ def _undetermined(branch: Branch, width: float) -> bool:
     an event that is known better than to the root of rounding is regular.
     """
     own = float(np.ptp(branch.values))
-    if not branch.bridge or own >= _NARROW * (1.0 + np.abs(branch.values).max()):
+    size = branch.model.size_of(
+        branch.model.index_of(branch.parameter), np.abs(branch.values).max()
+    )
+    if not branch.bridge or own >= _NARROW * size:
         return False
     known = [end.bifurcation.accuracy for end in branch.ends if end.bifurcation is not None]
     return any(accuracy > ROUGH and accuracy * width > own for accuracy in known)

@@ -139,7 +139,8 @@ def telling_kind(kinds: Iterable[Kind]) -> Kind:
 def _in_family(orbit: Orbit, branch: Branch, mirror: bool) -> bool:
     """Tell whether an orbit is one of a continuum: as near to one of its points as they are to each other."""
     value = orbit.params[branch.parameter]
-    if abs(value - branch.values[0]) > _SAME_ORBIT * (1.0 + abs(value)):
+    size = orbit.model.size_of(orbit.model.index_of(branch.parameter), value)
+    if abs(value - branch.values[0]) > _SAME_ORBIT * size:
         return False
     stops = [point.stops for point in branch]
     apart = max(stops_distance(a, b, False) for a, b in pairwise(stops))

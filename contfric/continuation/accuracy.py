@@ -141,7 +141,8 @@ class Estimate:
         if length < unknown:  # the point before is no better known, or is the located one itself
             # the slope is 2 c d, and what is left is c d^2
             slope = max(abs(before.slope), abs(self.point.slope))
-            own = abs(change) + unknown * min(2.0 * slope, unknown * (1.0 + abs(self.point.value)))
+            size = here.model.size_of(here.model.index_of(self.parameter), self.point.value)
+            own = abs(change) + unknown * min(2.0 * slope, unknown * size)
             return min(error, max(rough, own))
         if change == 0.0:
             return error
@@ -261,7 +262,7 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
             joints[i, j] += step
             row[i * m + j] = (condition.value(altered(orbit, joints=joints)) - value) / step
     vector = orbit.vector.copy()
-    step = _DIFFERENCE * (1.0 + abs(vector[active]))
+    step = _DIFFERENCE * orbit.model.size_of(active, vector[active])
     vector[active] += step
     row[-1] = (condition.value(altered(orbit, vector=vector)) - value) / step
     return row
@@ -270,8 +271,9 @@ def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) ->
 def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> float | None:
     """Return the error of the parameter at which a multiplier is on the unit circle."""
     value = float(here.vector[active])
-    distance = min(_BESIDE * (1.0 + abs(value)), _BESIDE_RANGE * width)
-    own = UNITS * float(np.finfo(float).eps) * (1.0 + abs(value))
+    size = here.model.size_of(active, value)
+    distance = min(_BESIDE * size, _BESIDE_RANGE * width)
+    own = UNITS * float(np.finfo(float).eps) * size
     least: float | None = None
     for share in _CLOSER:
         clear = 1.0 if share == 1.0 else _MISSED

@@ -86,14 +86,20 @@ def is_continuum(branch: Branch) -> bool:
     Its folds are asked, too: the points of a short bridge may all be near its ends, at one value.
     """
     return (
-        branch.arc[-1] > _LENGTH and _at_one_value(branch.values) and _at_one_value(branch.nodes[1])
+        branch.arc[-1] > _LENGTH
+        and _at_one_value(branch, branch.values)
+        and _at_one_value(branch, branch.nodes[1])
     )
 
 
-def _at_one_value(values: FloatArray) -> bool:
+def _at_one_value(branch: Branch, values: FloatArray) -> bool:
     """Tell whether values differ by what they are solved to."""
     low, high = float(values.min()), float(values.max())
-    return high - low < _ONE_VALUE * (1.0 + max(-low, high))
+    return high - low < _ONE_VALUE * _size(branch, max(-low, high))
+
+
+def _size(branch: Branch, value: float) -> float:
+    return branch.model.size_of(branch.model.index_of(branch.parameter), value)
 
 
 def continua_of(branch: Branch) -> Iterator[str]:
@@ -114,7 +120,7 @@ def continua_of(branch: Branch) -> Iterator[str]:
     at_one = np.min(away, axis=1) < _ONE
     for first, last in _runs(at_one):
         low, high = sorted((values[first], values[last]))
-        if high - low < _CHANGES * (1.0 + abs(high)):
+        if high - low < _CHANGES * _size(branch, high):
             continue
         yield (
             f"a continuum of orbits at each {name} between {low:.10g} and {high:.10g}: "

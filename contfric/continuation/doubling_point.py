@@ -95,8 +95,9 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     is so near that there is no orbit on one side of the parameter the curve of orbits is asked.
     """
     value, told = float(orbit.vector[active]), False
+    size = orbit.model.size_of(active, value)
     for beside in _BESIDE:
-        offset = beside * (1.0 + abs(value))
+        offset = beside * size
         sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
         if np.isfinite(sides).all() and min(np.abs(sides)) > _ROUNDING:
             told = True
@@ -146,7 +147,7 @@ def _refined(orbit: Orbit, active: int, opens: float) -> tuple[Orbit, float]:
     The best one that was met, and how far it misses: whether that is the multiplier is for the caller to say.
     """
     value = float(orbit.vector[active])
-    size = 1.0 + abs(value)
+    size = orbit.model.size_of(active, value)
     return _by_secants(orbit, opens, lambda shift, near: moved(near, active, value + shift), size)
 
 

@@ -57,7 +57,7 @@ def fold_between(
     split = _split_between(orbit, before, after, share, settings)
     if split is not None:
         return [split]
-    if _is_vertical(before, after, settings) or _jumps_at_end(before, after):
+    if _is_vertical(orbit, before, after, settings) or _jumps_at_end(before, after):
         return []
     return [not_located(orbit, Kind.SN, before, beyond, settings)]
 
@@ -96,10 +96,11 @@ def fold_at(
         return [(split, point)]
     if _is_jump(before, point, after) or _is_idle(orbit, before, point, after, settings):
         return []
-    if _is_vertical(before, after, settings):
+    if _is_vertical(orbit, before, after, settings):
         # of a bridge nothing but the parameter tells a fold
         known = vertex[0].accuracy * settings.width if settings.stability else 0.0
-        return [vertex] if _turns(before, point, after, known) else []
+        size = orbit.model.size_of(orbit.model.index_of(settings.parameter), point.value)
+        return [vertex] if _turns(before, point, after, max(known, _ROUNDING * size)) else []
     return [vertex]
 
 
@@ -148,13 +149,17 @@ def vertex_at(orbit: Orbit, point: Point, settings: Settings) -> Bifurcation | N
     return None if found.kind is Kind.SN else found
 
 
-def _is_vertical(before: Point, after: Point, settings: Settings) -> bool:
+def _is_vertical(orbit: Orbit, before: Point, after: Point, settings: Settings) -> bool:
     """Tell whether the parameter is constant over a step: the sign of its slope is rounding.
 
     At a fold the multiplier passes 1 as fast as the parameter turns; on a continuum it is 1.
     """
     slopes = max(abs(before.slope), abs(after.slope))
-    if slopes > _VERTICAL or abs(after.value - before.value) > _CONSTANT * settings.width:
+    size = orbit.model.size_of(orbit.model.index_of(settings.parameter), before.value)
+    if (
+        slopes > _VERTICAL * min(1.0, size)
+        or abs(after.value - before.value) > _CONSTANT * settings.width
+    ):
         return False
     if not settings.stability:
         return True
@@ -167,8 +172,7 @@ def _turns(before: Point, point: Point, after: Point, known: float) -> bool:
     On both sides its values lie on one side of that at the fold, and farther away than errors are.
     """
     gaps = [side.value - point.value for side in (before, after)]
-    least = max(known, _ROUNDING * (1.0 + abs(point.value)))
-    return gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > least
+    return gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > known
 
 
 def _is_jump(before: Point, point: Point, after: Point) -> bool:

@@ -288,5 +288,5 @@ def _difference(values: Sequence[float]) -> float:
 
 def _moved(unit: Orbit, active: int, sign: float) -> FloatArray:
     vector = unit.vector.copy()
-    vector[active] += sign * _STEP * (1.0 + abs(float(vector[active])))
+    vector[active] += sign * _STEP * unit.model.size_of(active, float(vector[active]))
     return vector

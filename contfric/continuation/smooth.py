@@ -59,6 +59,7 @@ def smooth_events(
     from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
+    size = min(1.0, orbit.model.size_of(active, before.value))
     # events after a sliding one do not happen
     slides = beyond is not after
     after = last_told(orbit, before, after, beyond, settings) or after
@@ -73,7 +74,7 @@ def smooth_events(
     for column, (a, b) in zip((FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR), values, strict=True):
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
-        if max(abs(a), abs(b)) < LEVEL:
+        if max(abs(a), abs(b)) < LEVEL * (size if column == FOLD else 1.0):
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
         if column != FOLD and _is_rounding(orbit, told, after, base + column, settings):
             continue

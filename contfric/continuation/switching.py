@@ -117,10 +117,11 @@ def overshoots(
     if not orbit.model.kinks:  # a corner would be the error of the event's own location
         return False
     at = settings_value(orbit, settings)
+    size = orbit.model.size_of(orbit.model.index_of(settings.parameter), at)
     far, near = departure.point.value - at, nearer.point.value - at
     straight = distance * along.slope  # two curves that cross leave with a slope of their own
     bent = abs(near - _AT_ONCE * straight) > _CORNER * abs(far - straight)
-    return bool(bent and abs(near - _AT_ONCE * straight) > _NO_CHANGE * (1.0 + abs(at)))
+    return bool(bent and abs(near - _AT_ONCE * straight) > _NO_CHANGE * size)
 
 
 def settings_value(orbit: Orbit, settings: Settings) -> float:

@@ -315,8 +315,9 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
         if found is None or not _has_fallen(side, orbit, int(k), found):
             continue
         # it lies within the step over which the branch turns, on either of the two ways
+        size = orbit.model.size_of(orbit.model.index_of(settings.parameter), tip.value)
         step, change = float(steps[k - first]), float(rows.w[k + 1, 0] - tip.value)
-        change = max(abs(change), step * abs(tip.slope)) + step**2 * (1.0 + abs(tip.value))
+        change = max(abs(change), step * abs(tip.slope)) + step**2 * size
         known = max(ROUGH, 2.0 * change / settings.width)
         side.rewind(int(k))
         side.end = End(EndReason[found.kind.name], bifurcation=replace(found, bound=known))

@@ -192,8 +192,8 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | Non
         trials.append((value, float(rates[active])))
         if abs(rates[active]) < _ROUNDED * scale and len(trials) > 1:
             break
-        value = _secant(trials, start)
-        if not abs(value - start) <= _FAR * (1.0 + abs(start)):
+        value = _secant(trials, _TRIAL * orbit.model.size_of(active, start))
+        if not abs(value - start) <= _FAR * orbit.model.size_of(active, start):
             return None
     else:
         return None
@@ -208,10 +208,10 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | Non
     return VerticalFamily(there, along.reshape(joints.shape), active, other, missed)
 
 
-def _secant(trials: list[tuple[float, float]], start: float) -> float:
+def _secant(trials: list[tuple[float, float]], first: float) -> float:
     """Return the next trial of the value; infinite where w F_b does not change."""
     if len(trials) == 1:
-        return start + _TRIAL * (1.0 + abs(start))
+        return trials[0][0] + first
     (x0, g0), (x1, g1) = trials[-2:]
     return np.inf if g1 == g0 else x1 - g1 * (x1 - x0) / (g1 - g0)
 

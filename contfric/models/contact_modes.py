@@ -22,7 +22,7 @@ from contfric.models.contact_ranges import constraints_of
 from contfric.models.contact_surfaces import ContactSurfaces, subsets
 from contfric.models.contacts import Contact, ContactKind, drift
 from contfric.models.description import STRUCTURE
-from contfric.models.entries import known_keys
+from contfric.models.entries import AUTO, known_keys
 from contfric.models.grammar import FLOATS, TIME, Scope, number_of, parse
 from contfric.models.matrices import summed, times
 from contfric.models.not_affine import NotAffineError
@@ -94,7 +94,9 @@ class Combinations:
             "forces": laws_of(self.structure, self.states),
             "departures": [] if only_quiet else departures_of(self.surfaces),
         }
-        found |= {"units": self._units(stretches)} if kept["units"] else {}
+        if kept["units"]:
+            alike = [[*self.coordinates, *stretches], [*self.velocities]]
+            found |= {"units": self._units(stretches), "alike": alike}
         if ranges := dict(constraints_of(self.contacts, defaults_of(self._data))):
             found["constraints"] = ranges | kept["constraints"]
         resets = resets_of(self.structure)
@@ -108,7 +110,9 @@ class Combinations:
 
     def _units(self, stretches: Sequence[str]) -> dict[str, Any]:
         """Return the units that are given, and what follows for velocities and stretches."""
-        given = self._data["units"]
+        given: dict[str, Any] = self._data["units"]
+        if AUTO in given:
+            return given
         known_keys(given, (*self.coordinates, *self.velocities, *stretches, TIME), ("units",))
         time, lengths = given.get(TIME, 1.0), [given.get(q, 1.0) for q in self.coordinates]
         found: dict[str, Any] = {v: q / time for v, q in zip(self.velocities, lengths, strict=True)}

@@ -71,6 +71,9 @@ __all__ = [
     "Symmetry",
 ]
 
+#: A parameter with a smaller default is compared with its default: 1 is far from all its values.
+_SMALL = 0.02
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Shown, TransitionMaps):
@@ -248,6 +251,15 @@ class Model(Shown, TransitionMaps):
     def defaults(self) -> dict[str, float]:
         """A fresh mapping of every parameter to its default value."""
         return Named({p.name: p.default for p in self.parameters})
+
+    def size_of(self, index: int, value: float) -> float:
+        """Return the size that differences of a parameter are compared with, where it has a value.
+
+        It is 1 + the value. Of a parameter that is far smaller than 1, such as a frequency where times are in
+        microseconds, the default stands for 1.
+        """
+        usual = abs(self.parameters[index].default)
+        return abs(value) + (usual if 0.0 < usual < _SMALL else 1.0)
 
     def index_of(self, name: str) -> int:
         """Return the position of a parameter in the engine's vectors.

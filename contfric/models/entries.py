@@ -11,6 +11,8 @@ from contfric.errors import ModelError, did_you_mean
 
 #: How a side of a surface can be written.
 SIDES = {"+": 1, "-": -1, "0": 0, "above": 1, "below": -1, "on": 0, "1": 1, "-1": -1, "+1": 1}
+#: Units that are chosen by the sizes of the states.
+AUTO = "auto"
 
 
 class EntryError(ModelError):

@@ -107,7 +107,7 @@ class OscillatorModel:
     integration: ClassVar[Mapping[str, Any]] = {}
     max_step: ClassVar[float | None] = None
     quantities: ClassVar[Mapping[str, str]] = {}
-    units: ClassVar[Mapping[str, float]] = {}
+    units: ClassVar[Mapping[str, float] | str] = {}
 
     def period(self, p: Symbols) -> Any:
         """Return the period of the excitation; None (as here) if there is none."""
@@ -190,7 +190,7 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
         "integration": dict(oscillator.integration),
         "max_step": oscillator.max_step,
         "quantities": dict(oscillator.quantities),
-        "units": dict(oscillator.units),
+        "units": units if isinstance(units := oscillator.units, str) else dict(units),
     }
     data.update({"autonomous": True} if period is None else {"period": _text(period)})
     return data

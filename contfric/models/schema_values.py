@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from contfric.base.yaml_lines import as_truth
 from contfric.errors import ModelError
-from contfric.models.entries import SIDES
+from contfric.models.entries import AUTO, SIDES
 from contfric.models.grammar import number_of
 
 #: Numbers that a model can be computed with: products of some of them are still finite.
@@ -49,6 +49,11 @@ def images(value: Any) -> Any:
     if not all(arrow for _, arrow, _ in pairs):
         raise ValueError("no arrow")
     return {name.strip(): image for name, _, image in pairs}
+
+
+def _chosen(value: Any) -> Any:
+    """Return ``auto`` as the mapping that says it."""
+    return {AUTO: 1.0} if value == AUTO else value
 
 
 def numbered(value: Any) -> Any:
@@ -114,8 +119,9 @@ Number: TypeAlias = Annotated[float, said("a finite number", gt=-_LARGEST, lt=_L
 Unit: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=_SMALL_UNIT, lt=_LARGE_UNIT)]
 Units: TypeAlias = Annotated[
     dict[str, Unit],
+    BeforeValidator(_chosen),
     said(
-        "a mapping of states and t to numbers, such as {x: 1.0e-3, t: 0.01}",
+        "'auto', or a mapping of states and t to numbers, such as {x: 1.0e-3, t: 0.01}",
         "the unit of '{}' must be a positive number",
     ),
 ]

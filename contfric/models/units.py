@@ -7,7 +7,11 @@ order 1. So a state of unit U is ``x = U X``, time is ``t = U_t T``, and
     dX/dT = (U_t/U) dx/dt ,    period/U_t ,    X after a reset = (new value)/U .
 
 What is solved, and all that results say of states and times, is in these units; parameters and quantities
-that the file declares stay as they are. Observables are divided by a power of ten near their size.
+that the file declares stay as they are. Observables are divided by their size.
+
+``units: auto`` chooses units by the sizes of states (:mod:`contfric.models.sizes`): then a model in any units
+is solved as the same numbers. Scaling formulas takes the place of a scale in each comparison with 1; there
+are some 170 of these.
 """
 
 from __future__ import annotations
@@ -19,9 +23,10 @@ from typing import Any
 from contfric.errors import ModelError
 from contfric.models.clocks import is_clock
 from contfric.models.description import Description
-from contfric.models.entries import EntryError, known_keys
+from contfric.models.entries import AUTO, EntryError, known_keys
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.grammar import TIME
+from contfric.models.sizes import chosen_units, rounded
 from contfric.models.tied import Substitution
 
 KEY = "units"
@@ -47,6 +52,8 @@ def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
         If a unit is wrong, or an angle has one.
     """
     units, plain = data.get(KEY), {key: value for key, value in data.items() if key != KEY}
+    if units and AUTO in units:
+        units = chosen_units(read(plain), data["spread"], data["angles"], data["alike"])
     if not units:
         return plain
     known_keys(units, (*data["states"], TIME), (KEY,))
@@ -142,7 +149,7 @@ def _measured(
 
 
 def _sizes(found: Description) -> dict[str, float]:
-    """Return a power of ten near the size of each observable that is no state."""
+    """Return the size of each observable that is no state."""
     params, evaluator = defaults(found), floats(found)
     places = list(Sampler(evaluator, params).states(_SAMPLES))
     sizes = {}
@@ -155,8 +162,7 @@ def _sizes(found: Description) -> dict[str, float]:
             continue  # where it has no value the check of the model says so
         values = [v for v in values if 0.0 < v < math.inf]
         if values:
-            middle = math.exp(sum(map(math.log, values)) / len(values))
-            sizes[observable.name] = 10.0 ** round(math.log10(middle))
+            sizes[observable.name] = rounded(math.exp(sum(map(math.log, values)) / len(values)))
     return {name: size for name, size in sizes.items() if size != 1.0}
 
 

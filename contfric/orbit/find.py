@@ -27,6 +27,7 @@ from contfric.orbit.repetition import shortest
 from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, creeps, is_point, winds
 from contfric.orbit.sections import is_smooth, loops, without_sections
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
+from contfric.orbit.sizes import warn_of_sizes
 from contfric.orbit.solve import centred, refine_with_symmetry
 from contfric.orbit.system import build_system
 from contfric.orbit.time_scale import clock_period, time_scale
@@ -114,9 +115,10 @@ def find_orbit(
     checked, time = model.check_params(params), real_number("time", time)
     places = Places(model, checked, at)
     begun = places.begin(state)
-    return places.put(
-        _wanted(_settled(model, checked, begun, time, longest, progress=progress), periods)
-    )
+    settled = _settled(model, checked, begun, time, longest, progress=progress)
+    found = places.put(_wanted(settled, periods))
+    warn_of_sizes(found)
+    return found
 
 
 def simulated_orbit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import yaml
 import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
+from contfric.models.describe import describe
 from contfric.models.files import from_data, loaded
+from tests.rescaled import rescaled
 
 FRICTION = """
 name: block
@@ -157,3 +160,110 @@ def test_units_that_are_far_off_are_proposed_anew() -> None:
         units={"q1": 1e-3, "t": 1.0},
     )
     assert 0.1 < proposed(model)["q1"] < 10.0
+
+
+#: Models in closed form, the parameter that varies, and its range.
+EXPLORED = {
+    "coulomb-yaml": ("Omega", 0.4, 0.6, {"Omega": 0.5, "S": 0.32, "S0": 0.4}),
+    "impact": ("w", 0.7, 1.1, {"w": 0.9}),
+    "walls": ("w", 1.7, 2.6, {"w": 2.2}),
+    "soft_stops": ("omega", 0.6, 0.95, {}),
+    "bilinear": ("omega", 0.66, 0.95, {}),
+    "jenkins": ("W", 0.6, 1.1, {}),
+    "pounding": ("w", 0.75, 0.85, {}),
+    "two-blocks": ("vb", 0.25, 0.5, {}),
+    "belt": ("vb", 0.05, 1.5, {}),
+    "popp": ("omega", 0.6, 1.2, {}),
+    "relay": ("zeta", 0.1, 0.5, {}),
+    "storeys": ("W", 0.58, 0.62, {}),
+    "blade-damper": ("W", 0.5, 0.9, {}),
+    "iwan": ("W", 0.8, 1.2, {}),
+}
+QUICK = ("bilinear", "impact", "two-blocks")
+
+
+def explored(model: Model, name: str, units: dict[str, float]) -> Any:
+    vary, low, high, params = EXPLORED[name]
+    given = {n: v / units.get(n, 1.0) for n, v in params.items()}
+    unit = units.get(vary, 1.0)
+    return cf.explore(cf.find_orbit(model, given), vary, (low / unit, high / unit))
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in EXPLORED],
+)
+def test_a_model_in_any_units_has_the_same_diagram(name: str, seed: int) -> None:
+    """States, time and parameters in random units between 1e-6 and 1e6, with units that are chosen."""
+    rng = np.random.default_rng([93, seed, len(name)])
+    folder = bundled_dir("models")
+    if not (folder / f"{name}.yaml").is_file():
+        folder = Path(__file__).parents[1] / "models"
+    data = yaml.safe_load((folder / f"{name}.yaml").read_text(encoding="utf-8"))
+    plain = describe(loaded(data, folder))
+    written = json.loads(plain.text)
+    units = {n: float(10.0 ** rng.uniform(-6.0, 6.0)) for n in [*written["states"], "t"]}
+    # exact, so that a limit of equal parameters (S0 >= S) holds
+    units |= {n: float(2.0 ** rng.integers(-20, 20)) for n in written["parameters"]}
+    other = from_data(rescaled(written, units) | {"units": "auto"})
+    wanted, found = explored(from_data(loaded(data, folder)), name, {}), explored(other, name, units)
+    vary = EXPLORED[name][0]
+    assert labels(found) == labels(wanted)
+    assert len(found.loose_ends) == len(wanted.loose_ends)
+    for a, b in zip(sorted_events(found, vary), sorted_events(wanted, vary), strict=True):
+        assert a.label == b.label
+        assert a.params[vary] * units[vary] == pytest.approx(b.params[vary], rel=1e-8)
+        one, two = (np.sort_complex(e.orbit.multipliers) for e in (a, b))
+        if np.abs(two).max() < 1e3:  # at a grazing they are infinite
+            assert one == pytest.approx(two, rel=1e-4, abs=1e-4)
+
+
+def labels(diagram: Any) -> list[list[str]]:
+    """Return the labels of the events of each branch, in an order of their own."""
+    return sorted(sorted(b.label for b in branch.bifurcations) for branch in diagram.branches)
+
+
+def sorted_events(diagram: Any, vary: str) -> list[Any]:
+    events = [event.bifurcation for event in diagram.events]
+    return sorted(events, key=lambda event: (event.params[vary], event.label))
+
+
+def test_units_are_chosen_for_structures_and_classes_alike() -> None:
+    """Coordinates have one unit, that of the largest; a pad of 1e-3 with a spring of 1e9 is of order 1."""
+    pad = {"kind": "friction", "velocity": "v1", "kinetic": "R"}
+    data = {"w": 2.1e4, "F": 2.0e6, "R": 0.1e6, "k": 1e9}
+    force = {"q1": "F*cos(w*t)"}
+    model = cf.Mechanism(
+        [2.0, 1.0],
+        [0.5, 0.5],
+        [["2*k", "-k"], ["-k", "k"]],
+        contacts={"pad": pad},
+        force=force,
+        parameters=data,
+        period="2*pi/w",
+        units="auto",
+    )
+    units = dict(model.units)
+    assert units["q1"] == units["q2"] and units["v1"] == units["v2"]
+    assert units["t"] == pytest.approx(1.0 / 2.1e4, rel=0.01)
+    orbit = cf.find_orbit(model)
+    assert 0.01 < np.abs(orbit.ends[:, 1:]).max() < 100.0
+
+
+def test_units_that_nothing_tells_are_an_error() -> None:
+    free = {"x": "v", "v": "-z", "z": "0*x"}
+    data = {"name": "free", "states": [*free], "parameters": {}, "autonomous": True, "field": free}
+    data["units"] = "auto"
+    with pytest.raises(cf.ModelError, match="nothing tells the size of x"):
+        model_of(data, Path())
+
+
+def test_an_orbit_far_from_1_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    sizes = (1.5e-6, 1.5e-6)
+    data = yaml.safe_load(FRICTION % (1.0, 1.0, 1.5e-6, 0.5, 4.8e-7, 6.2e-7, *sizes))
+    cf.find_orbit(model_of(data, Path()))
+    assert "units: auto" in caplog.text
+    caplog.clear()
+    cf.find_orbit(model_of(data | {"units": "auto"}, Path()))
+    assert not caplog.text

@@ -98,7 +98,8 @@ def _propose_units(
     report.warn(
         Topic.SCALES,
         f"states or times are far from 1 ({named}): orbits are told apart, and short segments from none, at "
-        f"thousandths of 1, so that events may be missed. Write units: {{{line}}}",
+        f"thousandths of 1, so that events may be missed. Say 'units: auto', or which. "
+        f"Write units: {{{line}}}",
     )
 
 

@@ -1,0 +1,31 @@
+"""States and times of an orbit that are far from 1, at which orbits and events are told apart badly."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from contfric.orbit.orbit import Orbit
+
+_log = logging.getLogger(__name__)
+#: What is short or near is decided at thousandths of 1: events are missed from a hundredth on.
+_FAR = 100.0
+
+
+def warn_of_sizes(orbit: Orbit) -> None:
+    """Log a warning where the largest state of an orbit, or all of its segments, are far from 1."""
+    states = np.abs(np.concatenate([orbit.begins[:, 1:], orbit.ends[:, 1:]]))
+    lasting = orbit.durations[orbit.durations > 0.0]
+    far = []
+    if states.size and not 1.0 / _FAR < states.max() < _FAR:
+        far.append(f"its largest state is {states.max():.1g}")
+    if lasting.size and (lasting.max() < 1.0 / _FAR or lasting.min() > _FAR):
+        far.append(f"its segments last {lasting.min():.1g} to {lasting.max():.1g}")
+    if far:
+        _log.warning(
+            "the orbit of '%s' is far from 1 in size: %s. Events may be missed: write 'units: auto' into "
+            "the model",
+            orbit.model.name,
+            " and ".join(far),
+        )
