@@ -23,7 +23,7 @@ _TOUCHED = 1e-6
 
 
 def with_section(orbit: Orbit, loose: Sequence[LooseEnd]) -> Orbit | None:
-    """Return an orbit in a model with a section in the mode in which a loose end goes on; None if none does."""
+    """Return an orbit in a model with a section where a loose end goes on in one mode; None if none does."""
     from contfric.models.phases import with_phase
 
     model = orbit.model
@@ -40,10 +40,12 @@ def with_section(orbit: Orbit, loose: Sequence[LooseEnd]) -> Orbit | None:
 
 def _modes_of(loose: Sequence[LooseEnd]) -> Iterator[str]:
     """Yield the modes in which orbits at loose ends lie with all of their length."""
-    for end in (item.end for item in loose if item.end.bifurcation is not None):
-        at = end.bifurcation.orbit.as_whole()
+    for bifurcation in (item.end.bifurcation for item in loose):
+        if bifurcation is None:
+            continue
+        at = bifurcation.orbit.as_whole()
         long = at.durations > _VANISHED * at.period
         modes = {pair[0] for pair, lasts in zip(at.itinerary, long, strict=True) if lasts}
-        jumps = np.abs(at.begins[:, 1:] - at.cycle[:, 1:]) > _TOUCHED * (1.0 + np.abs(at.cycle[:, 1:]))
-        if len(modes) == 1 and not np.any(jumps):
+        moved, size = np.abs(at.begins[:, 1:] - at.cycle[:, 1:]), 1.0 + np.abs(at.cycle[:, 1:])
+        if len(modes) == 1 and not np.any(moved > _TOUCHED * size):
             yield next(iter(modes))

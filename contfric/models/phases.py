@@ -91,7 +91,9 @@ def _rate_parts(
     if state in description.angles or mode not in data["modes"]:
         return {}
     rate = data["modes"][mode]["field"][state]
-    staying = [m.name for m in _staying(description) if data["modes"][m.name]["field"][state] == rate]
+    staying = [
+        m.name for m in _staying(description) if data["modes"][m.name]["field"][state] == rate
+    ]
     if mode not in staying or has_kinks(description, [rate]):
         return {}
     return _in_parts(data, staying, _section_of(description, data, SECTION, rate))

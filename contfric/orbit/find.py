@@ -16,8 +16,8 @@ from contfric.orbit.aperiodic import (
     MOST_PERIODS,
     affordable,
     goes_on,
-    moves_on,
     goes_round,
+    moves_on,
     out_of_range,
     why_none,
 )
