@@ -225,7 +225,7 @@ def _left_at_rest(
     for other in (sampler, _moved(sampler)):
         places = 0
         for t, y in other.states(_TRIES):
-            place = _on_both(other, on, limit, t, y)
+            place = _both_met(other, (on, limit), t, y)
             if place is None:
                 continue
             signs = {**other.sides(*place, names), on: 0}
@@ -240,19 +240,6 @@ def _left_at_rest(
             if places == _PLACES:
                 break
     return found
-
-
-def _on_both(
-    sampler: Sampler, on: str, limit: str, t: float, y: Sequence[float]
-) -> tuple[float, Sequence[float]] | None:
-    """Return a place on two surfaces, near a state; None if none is found."""
-    place: tuple[float, Sequence[float]] | None = sampler.landed(on, t, y)
-    for _ in range(20):  # one after the other, until both surfaces are met
-        if place is None or sampler.sides(*place, (on, limit)) == {on: 0, limit: 0}:
-            return place
-        second = sampler.landed(limit, *place)
-        place = second and sampler.landed(on, *second)
-    return None
 
 
 def _beside_limit(

@@ -55,11 +55,17 @@ def test_a_cycle_inside_of_one_mode_touches_the_surface_of_another(tmp_path, see
     orbit = cf.find_orbit(model)
     assert [exit_ for _, exit_ in orbit.itinerary] == ["section", "section"]
     assert orbit.period == pytest.approx(period, rel=1e-9)
+    found = []
     for start in (orbit, cf.find_orbit(model, {"d": 0.9 * top})):
         diagram = cf.explore(start, "d", (0.8 * top, 1.5 * top))
-        (graze,) = (b for b in diagram.bifurcations if b.kind.name != "T")
-        assert graze.kind.name == "GS" and graze.params["d"] == pytest.approx(top, rel=1e-9)
-        assert len(diagram.branches) == 2 and not diagram.loose_ends
+        (graze,) = (b for b in diagram.bifurcations if b.kind.name == "GS")
+        assert graze.params["d"] == pytest.approx(top, rel=1e-9)
+        assert not diagram.loose_ends
+        ends = [v for branch in diagram.branches for v in (branch.values[0], branch.values[-1])]
+        assert (min(ends), max(ends)) == (0.8 * top, 1.5 * top)
+        found.append(sorted((b.params["d"], b.kind.name) for b in diagram.bifurcations))
+    assert [kind for _, kind in found[0]] == [kind for _, kind in found[1]]
+    assert [d for d, _ in found[0]] == pytest.approx([d for d, _ in found[1]], rel=1e-9)
 
 
 def test_a_cycle_within_a_sliding_surface_begins_to_leave_it(tmp_path) -> None:
