@@ -7,7 +7,6 @@ surface at a place of an angle, two belts (parallel surfaces that slide), resets
 from __future__ import annotations
 
 import math
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

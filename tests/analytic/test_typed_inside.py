@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 from typed import typed
 
 import contfric as cf
@@ -162,3 +163,61 @@ spread: {{th: 3, p: 4}}
     (doubling,) = branch.bifurcations
     assert doubling.kind.name == "PD" and doubling.params["K"] == pytest.approx(kick, rel=1e-11)
     assert [end.reason.name for end in branch.ends] == ["RANGE", "RANGE"]
+
+
+def firing(tau: float, b: float, at: tuple[float, float], turns: int) -> float:
+    """Return the period of Wilson and Cowan's populations with Heaviside rates, by exponentials."""
+    heights = ([1.0, -b, 0.05], [1.0, -0.25, -0.3])
+    y, when = np.array(at), []
+    sides = [bool(h[:2] @ y + h[2] > 0) for h in map(np.array, heights)]
+    time = 0.0
+    for _ in range(4 * turns):
+        goal = np.array(sides, dtype=float)
+
+        def above(t, h, y=y, goal=goal):
+            """Return the height over a surface a time later."""
+            decay = np.exp(-np.divide.outer(t, [1.0, tau]))
+            return (goal + (y - goal) * decay) @ h[:2] + h[2]
+
+        hits = []
+        grid = np.geomspace(1e-9, 10.0, 400)
+        for k, h in enumerate(map(np.array, heights)):
+            for i in np.flatnonzero(np.diff(np.sign(above(grid, h))))[:1]:
+                hits.append((brentq(above, *grid[i : i + 2], args=(h,), xtol=1e-15), k))
+        lasts, k = min(hits)
+        y = goal + (y - goal) * np.exp([-lasts, -lasts / tau])
+        time += lasts
+        sides[k] = not sides[k]
+        if k == 0 and sides[0]:
+            when.append(time)
+    return when[-1] - when[-2]
+
+
+@pytest.mark.parametrize(("tau", "b"), [(0.6, 2.0), (0.75, 2.2), (0.9, 1.8)])
+def test_what_drives_off_its_surface_is_crossed_by_what_slides_on_another(tmp_path, tau, b) -> None:
+    """A population that excites itself never slides; where the other one slides, the two may cross."""
+    model = typed(
+        tmp_path,
+        f"""
+name: populations
+states: [u, v]
+parameters: {{a: 1.0, b: {b}, c: 1.0, d: 0.25, th1: -0.05, th2: 0.3, tau: {tau}}}
+autonomous: true
+observables: {{e: a*u - b*v - th1, i: c*u - d*v - th2}}
+surfaces:
+  E: {{observable: e, sliding: filippov}}
+  I: {{observable: i, sliding: filippov}}
+modes:
+  on_on: {{in: {{E: +, I: +}}, field: {{u: -u + 1, v: (-v + 1)/tau}}}}
+  on_off: {{in: {{E: +, I: -}}, field: {{u: -u + 1, v: -v/tau}}}}
+  off_on: {{in: {{E: -, I: +}}, field: {{u: -u, v: (-v + 1)/tau}}}}
+  off_off: {{in: {{E: -, I: -}}, field: {{u: -u, v: -v/tau}}}}
+""",
+    )
+    assert {mode.name for mode in model.modes if mode.sliding} == {
+        "slide_I_on_on_on_off",
+        "slide_I_off_on_off_off",
+    }
+    orbit = cf.find_orbit(model, state=(0.4, 0.2))
+    assert len(orbit.itinerary) == 4
+    assert orbit.period == pytest.approx(firing(tau, b, (0.4, 0.2), 600), rel=1e-9)
