@@ -195,16 +195,18 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     """Return whether every sliding mode is left without acceleration: the flow then never jumps.
 
     That is so where the limit under which a mode slides is the very place at which the field next to it
-    turns around (static and kinetic limits agree); it must be so for other parameters, too.
+    turns around (static and kinetic limits agree); it must be so for other parameters, too. A surface that
+    slides itself is no such limit: what goes on from both has limits of its own.
     """
     under = {
         domain.mode: [n for n, side in domain.signs.items() if side == 0] for domain in domains
     }
+    slid = {on for surfaces in under.values() for on in surfaces}
     pairs = {
         (under[mode.name][0], limit)
         for mode in description.modes
         for limit, side in mode.sides.items()
-        if side != 0 and len(under.get(mode.name, ())) == 1
+        if side != 0 and limit not in slid and len(under.get(mode.name, ())) == 1
     }
     at = {tuple(sorted(d.signs.items())): d for d in domains}
     found = False
