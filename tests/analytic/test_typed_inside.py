@@ -95,6 +95,28 @@ symmetry: x -> -x, v -> -v, z -> -z
         assert min(ends) == 1.5 and max(ends) == 3.5
 
 
+def test_a_hopf_cycle_may_lie_within_a_sliding_surface(tmp_path) -> None:
+    """A cubic oscillator that a third state follows by sliding: x = 2 sqrt(mu) cos t to second order."""
+    model = typed(
+        tmp_path,
+        """
+name: slaved
+states: [x, v, z]
+parameters: {mu: -0.1, k: 3.0}
+autonomous: true
+surfaces: {s: {observable: z, sliding: filippov}}
+modes:
+  up: {in: {s: +}, field: {x: v, v: (mu - x**2)*v - x, z: -k + v - z}}
+  down: {in: {s: -}, field: {x: v, v: (mu - x**2)*v - x, z: k + v - z}}
+""",
+    )
+    (rest,) = [e for e in cf.find_equilibria(model) if e.admissible]
+    (hopf,) = cf.continue_equilibrium(rest, "mu", (-0.5, 0.5)).events
+    cycle = hopf.cycle(0.05)
+    assert hopf.label == "H-" and {mode for mode, _ in cycle.itinerary} == {"slide", "slide-"}
+    assert cycle.x_max == pytest.approx(2 * math.sqrt(cycle.params["mu"]), rel=1e-4)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_hopf_cycle_needs_no_section(tmp_path, seed: int) -> None:
     """Of x' = mu x - w y - s x r^2 the cycle is a circle of radius sqrt(mu/s), until it meets the wall."""
