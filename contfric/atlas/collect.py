@@ -101,7 +101,7 @@ def collect(
         LooseEnd(location[i], side, _not_followed(end) if end.reason in _FOLLOWED else end)
         for i, branch in enumerate(computed)
         for side, end in enumerate(branch.ends)
-        if end.reason not in FINAL and not _is_followed(events, settings, i, end)
+        if end.reason not in FINAL and not _is_followed(events, settings, (i, branch), end)
     ]
     return Diagram(
         model,
@@ -212,8 +212,11 @@ def _nodes(event: Event, location: dict[int, int], image: dict[int, int]) -> lis
     return [Node(event.bifurcation, here), Node(event.bifurcation, there, mirrored=True)]
 
 
-def _is_followed(events: list[Event], settings: Settings, index: int, end: End) -> bool:
-    """Tell whether another branch goes on from an end; mirror images share theirs."""
+def _is_followed(
+    events: list[Event], settings: Settings, own: tuple[int, Branch], end: End
+) -> bool:
+    """Tell whether another branch goes on from an end of a numbered branch; mirror images share theirs."""
+    index, branch = own
     if end.reason not in _FOLLOWED or end.bifurcation is None:
         return False
     for event in events:
@@ -222,8 +225,7 @@ def _is_followed(events: list[Event], settings: Settings, index: int, end: End) 
             member
             or same_event(event.bifurcation, end.bifurcation, settings.parameter, settings.width)
         ):
-            through = event.bifurcation.symmetric and any(
-                p.verdict is Decision.KNOWN for p in event.proposals
-            )
-            return len(event.branches) > 1 or through  # through: its mirror image goes on
+            meets = event.bifurcation.symmetric and not branch.symmetric  # its mirror image
+            through = meets and any(p.verdict is Decision.KNOWN for p in event.proposals)
+            return len(event.branches) > 1 or through
     return False

@@ -16,6 +16,7 @@ from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
+from contfric.atlas.inside import with_section
 from contfric.atlas.leaving_event import settings_for
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
@@ -126,7 +127,7 @@ def explore(
         # tables that grow as modes are visited belong to one thread
         with nullcontext() if orbit.model.composed else in_advance():
             _follow_from(state, orbit, seeds)
-        return collect(
+        found = collect(
             orbit.model,
             settings,
             (float(range[0]), float(range[1])),
@@ -136,6 +137,24 @@ def explore(
             state.complete,
             altered(asked, max_periods=state.max_periods, copies=state.copies),
         )
+    divided = with_section(orbit, found.loose_ends) if found.complete else None
+    if divided is None:
+        return found
+    return explore(
+        divided,
+        parameter,
+        range,
+        max_step=max_step,
+        stability=stability,
+        bridges=bridges,
+        max_periods=max_periods,
+        copies=copies,
+        max_branches=max_branches,
+        max_points=max_points,
+        stop_at=stop_at,
+        seeds=seeds,
+        progress=progress,
+    )
 
 
 def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:

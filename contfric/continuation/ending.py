@@ -47,10 +47,11 @@ def is_point(orbit: Orbit) -> bool:
     """Tell whether an autonomous orbit has shrunk to a point, and not only its joints to one location."""
     if not orbit.model.autonomous:
         return False
-    states = orbit.joints[:, 1:]
-    size = np.abs(states - states[0]).max() + np.abs(orbit.ends[-1, 1:] - states[0]).max()
+    states = np.concatenate(
+        [orbit.begins[:, 1:], orbit.ends[:, 1:]]
+    )  # a clock that ticks is no point
     least = _NO_SIZE * (1.0 + np.abs(states).max())
-    return bool(size < least) and orbit.x_max - orbit.x_min < least
+    return bool(np.ptp(states, axis=0).max() < least) and orbit.x_max - orbit.x_min < least
 
 
 def never_leaves(orbit: Orbit) -> bool:

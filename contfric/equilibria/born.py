@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
-from contfric.equilibria.regions import scale_of
+from contfric.equilibria.regions import regions_of, scale_of
 from contfric.errors import ContfricError, ConvergenceError, real_number
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
@@ -40,6 +41,7 @@ _LONGEST = 4000
 def cycle_of_hopf(event: HopfPoint, amplitude: float | None = None) -> Orbit:
     """Return a small cycle near a Hopf point; see :meth:`~contfric.HopfPoint.cycle`."""
     _check_autonomous(event)
+    event = _with_section(event)
     if event.lyapunov == 0.0:
         raise ConvergenceError(
             f"{event!r}: the first Lyapunov coefficient is 0, and tells neither side nor size of a cycle"
@@ -55,6 +57,21 @@ def cycle_of_hopf(event: HopfPoint, amplitude: float | None = None) -> Orbit:
         f"{event!r}: Newton's method found no cycle of amplitude {first:.3g} or less; try another "
         "amplitude=..."
     )
+
+
+def _with_section(event: HopfPoint) -> HopfPoint:
+    """Return an event in a model with a section through its equilibrium, which cuts the cycles that are born.
+
+    The rate of a state vanishes at an equilibrium.
+    """
+    from contfric.models.phases import with_phase
+
+    at = event.equilibrium
+    divided = None if any(_sections(event)) else with_phase(at.model, at.region.mode)
+    if divided is None:
+        return event
+    region = next(r for r in regions_of(divided) if r.mode == at.region.mode)
+    return replace(event, equilibrium=replace(at, region=region))
 
 
 def _check_autonomous(event: EquilibriumEvent) -> None:

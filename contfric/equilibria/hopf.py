@@ -22,7 +22,7 @@ the branch at the rate
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,9 @@ from contfric.models.definition import FloatArray
 _REAL = 1e-7
 #: Relative: a coefficient smaller than this, compared with its terms, is zero to rounding.
 _CANCELLED = 1e-10
+#: Hopf points are located to rounding, some to its root at worst: relative to the parameter, or to the change
+#: of it that moves the real part by omega.
+_PLACE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +72,20 @@ def is_oscillating(eigenvalues: ComplexArray, k: int) -> bool:
 
 
 def centre_of(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> Centre:
-    """Return the centre subspace and the normal form of a Hopf point."""
+    """Return the centre subspace and the normal form of a Hopf point.
+
+    A coefficient that has the parameter as a factor, as that of van der Pol's oscillator, is zero where the
+    parameter is: then rounding of the place gives it a sign, and the other one beside it.
+    """
+    found = _normal_form(region, y, p, active)
+    unit = found.frequency / abs(found.rate) if found.rate else 0.0
+    moved = _PLACE * max(abs(float(p[active])), unit) * np.eye(len(p))[active]
+    near = [_normal_form(region, y, p + way * moved, active).lyapunov for way in (-1, 1)]
+    return replace(found, lyapunov=0.0) if near[0] * near[1] < 0.0 else found
+
+
+def _normal_form(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> Centre:
+    """Return the centre subspace and the normal form at a state and parameters."""
     fields = region.fields
     a = fields.jacobian(y, p)
     values, vectors = np.linalg.eig(a)

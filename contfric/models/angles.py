@@ -4,7 +4,9 @@
 on at the other. So a pendulum oscillates and rotates, and its rotations close. Nothing happens to the motion
 there: the surfaces are joints of orbits that turn, and bound nothing (:class:`contfric.models.parts.Reset`).
 Where a surface of the model lies at pi, such as ``sin(theta) = 0``, they are moved: of two surfaces that are
-always met at once it is not known which is first. A surface that is met once only as the angle grows, such as
+always met at once it is not known which is first. So they are where a model with excitation may rest at pi (a
+rotor that is kicked by ``sin(theta)``): what rests at a cut is on neither side of it. A surface that is met
+once only as the angle grows, such as
 ``theta = pi`` (and not ``sin(theta) = 0``), has to lie between the two.
 """
 
@@ -17,6 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.clocks import is_clock
 from contfric.models.entries import EntryError
 from contfric.models.grammar import FLOATS, TIME, Scope, parse
 
@@ -73,8 +76,8 @@ def with_angles(data: dict[str, Any]) -> dict[str, Any]:
 def _cut(data: Mapping[str, Any], angle: str) -> tuple[str, str]:
     """Return (a turn before, where an angle begins again).
 
-    That is pi, or the first place where no surface lies, and such that all that a growing angle meets once is
-    in between.
+    That is pi, or the first place where no surface lies and nothing rests, and such that all that a growing
+    angle meets once is in between.
 
     Raises
     ------
@@ -82,12 +85,15 @@ def _cut(data: Mapping[str, Any], angle: str) -> tuple[str, str]:
         If such a surface is met nowhere: it names a place that the angle never comes to.
     """
     heights = {name: _heights(data, angle, entry) for name, entry in data["surfaces"].items()}
+    excited = not data.get("autonomous") or any(is_clock(s) for s in data["states"])
+    rests = excited and not data.get("symmetry")
     once = {name: height for name, height in heights.items() if _is_met_once(height)}
     missed: dict[tuple[str, str], list[str]] = {}
     for cut in _CUTS:
         low, high = (Scope[float](FLOATS, {}).evaluate(parse(text)) for text in cut)
         missed[cut] = [n for n, height in once.items() if not _is_between(height, low, high)]
-        if not missed[cut] and not any(_is_on(height, high) for height in heights.values()):
+        met = any(_is_on(height, high) for height in heights.values())
+        if not (missed[cut] or met or (rests and _may_rest(data, angle, high))):
             return cut
     for name in once:
         if all(name in found for found in missed.values()):
@@ -105,24 +111,49 @@ Heights = Callable[[float], list[float]]
 
 def _heights(data: Mapping[str, Any], angle: str, surface: Mapping[str, Any]) -> Heights:
     """Return the function of an angle that the height of a surface is."""
-    values: dict[str, float] = {n: entry["default"] for n, entry in data["parameters"].items()}
-    texts = {**data["define"], **data["observables"]}
 
     def heights(at: float) -> list[float]:
         draw, found = random.Random(1), []
         for _ in range(_STATES):
             y = {name: draw.uniform(-1.0, 1.0) for name in (*data["states"], TIME)}
-            found.append(math.nan)
-            with suppress(
-                ModelError, ArithmeticError, TypeError, ValueError
-            ):  # its reader says why
-                named = {name: parse(text) for name, text in texts.items() if text != name}
-                scope = Scope[float](FLOATS, {**values, **y, angle: at}, named)
-                observable, level = (parse(surface[k]) for k in ("observable", "level"))
-                found[-1] = float(scope.evaluate(observable) - scope.evaluate(level))
+            observable, level = (
+                _value(data, surface[k], {**y, angle: at}) for k in ("observable", "level")
+            )
+            found.append(observable - level)
         return found
 
     return heights
+
+
+def _value(data: Mapping[str, Any], text: str, at: Mapping[str, float]) -> float:
+    """Return what an expression is at a state and the default parameters; nan where it has no value."""
+    values: dict[str, float] = {n: entry["default"] for n, entry in data["parameters"].items()}
+    texts = {**data["define"], **data["observables"]}
+    with suppress(ModelError, ArithmeticError, TypeError, ValueError):  # its reader says why
+        named = {name: parse(formula) for name, formula in texts.items() if formula != name}
+        return float(Scope[float](FLOATS, {**values, **at}, named).evaluate(parse(text)))
+    return math.nan
+
+
+def _may_rest(data: Mapping[str, Any], angle: str, at: float) -> bool:
+    """Tell whether a state that rests at an angle, all others but clocks at 0, stays so in some mode."""
+    states = [s for s in data["states"] if not is_clock(s)]
+    rest = {**dict.fromkeys(data["states"], 0.0), angle: at}
+
+    def keeps(values: Mapping[str, Any], kept: Mapping[str, float]) -> bool:
+        """Tell whether expressions have given values, whatever the time is."""
+        return all(
+            abs(_value(data, values[s], {**rest, TIME: time}) - kept[s]) < _ON
+            for s in states
+            for time in range(_STATES)
+            if s in values
+        )
+
+    own = [mode["field"] for mode in data["modes"].values() if "field" in mode]
+    fields = [*own, *([data["field"]] if "field" in data else [])]
+    return any(keeps(f, dict.fromkeys(states, 0.0)) for f in fields) and all(
+        keeps(reset, rest) for reset in data["resets"].values()
+    )
 
 
 def _is_on(heights: Heights, at: float) -> bool:

@@ -195,16 +195,18 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     """Return whether every sliding mode is left without acceleration: the flow then never jumps.
 
     That is so where the limit under which a mode slides is the very place at which the field next to it
-    turns around (static and kinetic limits agree); it must be so for other parameters, too.
+    turns around (static and kinetic limits agree); it must be so for other parameters, too. A surface that
+    slides itself is no such limit: what goes on from both has limits of its own.
     """
     under = {
         domain.mode: [n for n, side in domain.signs.items() if side == 0] for domain in domains
     }
+    slid = {on for surfaces in under.values() for on in surfaces}
     pairs = {
         (under[mode.name][0], limit)
         for mode in description.modes
         for limit, side in mode.sides.items()
-        if side != 0 and len(under.get(mode.name, ())) == 1
+        if side != 0 and limit not in slid and len(under.get(mode.name, ())) == 1
     }
     at = {tuple(sorted(d.signs.items())): d for d in domains}
     found = False
@@ -225,7 +227,7 @@ def _left_at_rest(
     for other in (sampler, _moved(sampler)):
         places = 0
         for t, y in other.states(_TRIES):
-            place = _on_both(other, on, limit, t, y)
+            place = _both_met(other, (on, limit), t, y)
             if place is None:
                 continue
             signs = {**other.sides(*place, names), on: 0}
@@ -240,19 +242,6 @@ def _left_at_rest(
             if places == _PLACES:
                 break
     return found
-
-
-def _on_both(
-    sampler: Sampler, on: str, limit: str, t: float, y: Sequence[float]
-) -> tuple[float, Sequence[float]] | None:
-    """Return a place on two surfaces, near a state; None if none is found."""
-    place: tuple[float, Sequence[float]] | None = sampler.landed(on, t, y)
-    for _ in range(20):  # one after the other, until both surfaces are met
-        if place is None or sampler.sides(*place, (on, limit)) == {on: 0, limit: 0}:
-            return place
-        second = sampler.landed(limit, *place)
-        place = second and sampler.landed(on, *second)
-    return None
 
 
 def _beside_limit(

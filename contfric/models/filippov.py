@@ -62,10 +62,11 @@ def sliding_parts(
     found: dict[str, Any] = {k: dict(data[k]) for k in ("observables", "surfaces", "modes")}
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
     slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
-    # where nothing slides all pass, where surfaces cross, too
+    # what all pass, as no solution is driven back to it, is crossed by what slides on others
     heights: dict[str, Any] = {}
-    slides = any(sliding.somewhere for sliding in slidings)
-    if slides and (crossing := _crossing(description, surfaces, pairs)):
+    slid = {sliding.surface for sliding in slidings if sliding.somewhere}
+    held = tuple(s for s in surfaces if s in slid)
+    if crossing := _crossing(description, held, [pair for pair in pairs if pair[0] in slid]):
         return crossing_parts(description, crossing, data)
     for sliding in slidings:
         if sliding.name in found["modes"]:

@@ -8,15 +8,21 @@ orbits that meet other surfaces (:mod:`contfric.models.sections`), and what labe
 
 No orbit stays in a mode that ends at known times, or of which the region fixes the sign of the rate of a
 state (a slide, ``x' = v > 0``), nor where a state that is no angle has a constant rate.
+
+Without excitation a cycle has no phase, but each state of it stands still somewhere. Where a solution is seen
+to stay in a mode, the rate of a state in that mode is the section (:func:`with_phase`): of the first state
+whose rate has no kink.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from contfric.errors import ModelError
 from contfric.models.contact_laws import KEY as FORCES
 from contfric.models.contacts import Contact, ContactKind
 from contfric.models.description import Description, ModeText
@@ -25,13 +31,15 @@ from contfric.models.measuring import proportional
 from contfric.models.parts import MOST_SURFACES
 from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
-from contfric.models.sections import joined_modes
+from contfric.models.sections import has_kinks, joined_modes
 
 if TYPE_CHECKING:
     from contfric.models.definition import Model
 
 #: The key of what has been divided, and the name of the observable and the surface.
 KEY = "phase"
+#: The same of a section without excitation.
+SECTION = "section"
 #: What the name of the second part of a mode of a structure with many contacts ends with.
 PART = "-"
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
@@ -48,22 +56,47 @@ _MOST_REGIONS = 343
 _MODELS = 16
 
 
-def with_phase(model: Model) -> Model | None:
-    """Return a model whose modes the phase divides, however many its regions are; None if none has to be."""
+def with_phase(model: Model, mode: str) -> Model | None:
+    """Return a model with a section in a mode in which a solution stays; None where it cannot have one.
+
+    With excitation the phase divides all modes in which an orbit may stay, however many regions there are.
+    """
     if not model.definition or model.phase:
         return None
-    return _with_phase(model.definition)
+    return _with_phase(model.definition, mode if model.autonomous else "")
 
 
 @lru_cache(maxsize=_MODELS)
-def _with_phase(definition: str) -> Model | None:
+def _with_phase(definition: str, mode: str) -> Model | None:
     from contfric.models.derive import model_from
     from contfric.models.describe import describe, from_text
 
     description = from_text(definition)
     data = description.data()
-    parts = phase_parts(description, data, however_many=True)
-    return model_from(describe({**data, **parts})) if parts else None
+    if not mode:
+        parts = phase_parts(description, data, however_many=True)
+        return model_from(describe({**data, **parts})) if parts else None
+    for state in description.states:
+        parts = _rate_parts(description, data, mode, state)
+        with suppress(ModelError):  # its symmetry leads to no section
+            if parts:
+                return model_from(describe({**data, **parts}))
+    return None
+
+
+def _rate_parts(
+    description: Description, data: Mapping[str, Any], mode: str, state: str
+) -> dict[str, Any]:
+    """Return the parts of a model's data with the rate of a state as a section in all modes that have it."""
+    if state in description.angles or mode not in data["modes"]:
+        return {}
+    rate = data["modes"][mode]["field"][state]
+    staying = [
+        m.name for m in _staying(description) if data["modes"][m.name]["field"][state] == rate
+    ]
+    if mode not in staying or has_kinks(description, [rate]):
+        return {}
+    return _in_parts(data, staying, _section_of(description, data, SECTION, rate))
 
 
 def phase_parts(
@@ -78,15 +111,20 @@ def phase_parts(
     """
     if not description.period or description.phase:
         return {}
+    phase = f"sin(2*pi*t/({description.period}) - {_LATE})"
     if description.structure:  # which modes it divides is told when they are visited
         surfaces = len(description.surfaces)
-        return _phase_of(description, data) if surfaces < MOST_SURFACES else {}
+        return _section_of(description, data, KEY, phase) if surfaces < MOST_SURFACES else {}
     if not however_many and _has_many(description):
         return {}
     staying = [mode.name for mode in _staying(description)]
-    if not staying:
-        return {}
-    added = _phase_of(description, data)
+    return _in_parts(data, staying, _section_of(description, data, KEY, phase)) if staying else {}
+
+
+def _in_parts(
+    data: Mapping[str, Any], staying: Sequence[str], added: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the parts of a model's data in which a section divides some modes."""
     name = added[KEY]
     modes: dict[str, Any] = {}
     parts: dict[str, tuple[str, ...]] = {}
@@ -117,8 +155,10 @@ def phase_parts(
     }
 
 
-def _phase_of(description: Description, data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parts of a model's data in which it has the phase as a surface."""
+def _section_of(
+    description: Description, data: Mapping[str, Any], called: str, formula: str
+) -> dict[str, Any]:
+    """Return the parts of a model's data in which it has a section, the zero of a formula."""
     names = description.names
     taken = {
         *names.states,
@@ -126,8 +166,7 @@ def _phase_of(description: Description, data: Mapping[str, Any]) -> dict[str, An
         *names.parts,
         *(s.name for s in description.surfaces),
     }
-    name = next(n for n in (KEY + "_" * k for k in range(len(taken) + 1)) if n not in taken)
-    formula = f"sin(2*pi*t/({description.period}) - {_LATE})"
+    name = next(n for n in (called + "_" * k for k in range(len(taken) + 1)) if n not in taken)
     return {
         "observables": {**(data.get("observables") or {}), name: formula},
         "surfaces": {**(data.get("surfaces") or {}), name: {"observable": name, "level": "0"}},

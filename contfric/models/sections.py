@@ -159,7 +159,7 @@ class _SampledFields:
 
     def agree(self, a: ModeText, b: ModeText, between: set[str]) -> bool:
         """Tell whether two modes have one field, as it is on either side of what divides them."""
-        if a.field == b.field and not _has_kinks(self.description, a.field):
+        if a.field == b.field and not has_kinks(self.description, a.field):
             return True
         for here, there in zip(self.of(a), self.of(b), strict=True):
             if abs(here - there) > _SAME * (1.0 + abs(here) + abs(there)):
@@ -177,7 +177,7 @@ def _parameters(description: Description) -> list[dict[str, float]]:
     return [params, {name: value or 0.1 + 0.1 * draw.random() for name, value in moved.items()}]
 
 
-def _has_kinks(description: Description, texts: Iterable[str]) -> bool:
+def has_kinks(description: Description, texts: Iterable[str]) -> bool:
     """Tell whether expressions use functions with kinks, in their named parts too."""
     parts, waiting, seen = description.names.parts, list(texts), set()
     while waiting:

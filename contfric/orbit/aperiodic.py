@@ -166,11 +166,7 @@ def goes_on(trajectory: Trajectory) -> str:
     """Return what a solution does that meets nothing any more; nothing if it has come to an equilibrium."""
     model, (_, time, state, mode) = trajectory.model, trajectory.last
     vector = model.vector(trajectory.params)
-    flow, whole, signs = (
-        model.view(vector),
-        model.whole_mode(mode),
-        signs_at(model, time, state, vector),
-    )
+    whole, signs = model.whole_mode(mode), signs_at(model, time, state, vector)
     for surface, side in signs.items():
         if surface in model.settled_sides:  # at rest on a wall it is on either side
             continue
@@ -180,12 +176,19 @@ def goes_on(trajectory: Trajectory) -> str:
                 f"the solution has left the region of '{mode}' at '{surface}', where no mode follows. "
                 "`contfric check` says what is missing"
             )
-    before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
-    moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
-    if not moves > _APART * (1.0 + float(np.max(np.abs(state)))):
+    if not moves_on(trajectory):
         return ""
     return (
         f"the solution stays in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
         "at a section: give the model a surface that it crosses, with two modes of the same field on its "
         "sides"
     )
+
+
+def moves_on(trajectory: Trajectory) -> bool:
+    """Tell whether a solution is somewhere else at times after its end: it has not come to an equilibrium."""
+    model, (_, time, state, mode) = trajectory.model, trajectory.last
+    flow, whole = model.view(model.vector(trajectory.params)), model.whole_mode(mode)
+    before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
+    moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
+    return moves > _APART * (1.0 + float(np.max(np.abs(state))))

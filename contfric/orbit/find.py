@@ -17,6 +17,7 @@ from contfric.orbit.aperiodic import (
     affordable,
     goes_on,
     goes_round,
+    moves_on,
     out_of_range,
     why_none,
 )
@@ -198,13 +199,17 @@ def _settled(
 
 
 def _divided_by_phase(trajectory: Trajectory) -> Model | None:
-    """Return the model with the phase as a section where a solution stays in a mode without one; or None."""
-    quiet = trajectory.end is SimulationEnd.QUIET and not goes_on(trajectory)
-    if not (quiet or trajectory.end is SimulationEnd.HELD):
+    """Return the model with a section where a solution stays in a mode without one; or None."""
+    model = trajectory.model
+    held = trajectory.end is SimulationEnd.HELD
+    if not (held or trajectory.end is SimulationEnd.QUIET):
+        return None
+    stays = moves_on(trajectory) if model.autonomous else held or not moves_on(trajectory)
+    if not stays:
         return None
     from contfric.models.phases import with_phase  # which reads the model again
 
-    return with_phase(trajectory.model)
+    return with_phase(model, model.whole_mode(trajectory.last[3]))
 
 
 def _after_creep(trajectory: Trajectory) -> tuple[float, FloatArray] | None:
@@ -247,7 +252,8 @@ def _check_motion(trajectory: Trajectory) -> None:
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
-            why = f"the solution stays in mode '{mode}' for ever: nothing releases it"
+            held = trajectory.model.whole_mode(mode)
+            why = f"the solution stays in mode '{held}' for ever: nothing releases it"
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
         if missing and (rest := trajectory.model.chatter_by_mode.get(mode)):
             raise ConvergenceError(

@@ -207,7 +207,10 @@ def test_a_model_in_any_units_has_the_same_diagram(name: str, seed: int) -> None
     # exact, so that a limit of equal parameters (S0 >= S) holds
     units |= {n: float(2.0 ** rng.integers(-20, 20)) for n in written["parameters"]}
     other = from_data(rescaled(written, units) | {"units": "auto"})
-    wanted, found = explored(from_data(loaded(data, folder)), name, {}), explored(other, name, units)
+    wanted, found = (
+        explored(from_data(loaded(data, folder)), name, {}),
+        explored(other, name, units),
+    )
     vary = EXPLORED[name][0]
     assert labels(found) == labels(wanted)
     assert len(found.loose_ends) == len(wanted.loose_ends)
