@@ -261,7 +261,7 @@ class StructureFile(AnyModel):
     mass: Matrix = "identity"
     damping: Matrix = "0"
     stiffness: Matrix = "0"
-    force: Expressions = EMPTY
+    force: Formulas = mapping("a mapping of coordinates to expressions", FORMULA)
     contacts: dict[str, AnyContact] = mapping(
         "a mapping of names to contacts such as {kind: friction, velocity: v1, kinetic: S}"
     )

@@ -48,6 +48,16 @@ STACK = (
 )
 
 
+#: Both rates of the blocks that switch.
+SWITCHED = BLOCKS[BLOCKS.index("- S*sign") : BLOCKS.index("\nmodes")]
+
+
+def switched(strength: int) -> str:
+    """Return rates in which each switch drives the other block as well, so many times as strongly."""
+    text = SWITCHED.replace("S*sign(u - vb)", f"S*sign(u - vb) - {strength}*S*sign(w - vb)")
+    return text.replace("+ q*sign(u - vb)*sign(w - vb)", f"- {strength}*R*sign(u - vb)")
+
+
 def typed(text: str) -> cf.Model:
     return from_data(yaml.safe_load(text.replace(" + q*sign(u - vb)*sign(w - vb)", "")))
 
@@ -155,9 +165,9 @@ def test_limits_of_the_stack_keep_their_order() -> None:
     ("old", "new", "says"),
     [
         ("q*sign(u - vb)", "0.2*sign(u - vb)", "do not add up in 'w'"),
-        ("- R*sign(w - vb) + q*sign(u - vb)*sign(w - vb)", "- R*sign(u - vb)", "singular"),
+        (SWITCHED, switched(1), "singular"),
+        (SWITCHED, switched(2), "not driven back"),
         ("R*sign(w - vb) + q", "R*(1 + y**2)*sign(w - vb) + 0*q", "depends on the state"),
-        ("- R*sign(w - vb) + q", "+ R*sign(w - vb) + 0*q", "not driven back"),
     ],
 )
 def test_what_is_not_determined_is_refused(old: str, new: str, says: str) -> None:

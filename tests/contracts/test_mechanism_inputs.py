@@ -28,7 +28,10 @@ def frame(**given: Any) -> cf.Model:
         ({"force": ["cos(w*t)", "0"]}, "'force' must be a mapping of coordinates"),
         ({"force": np.array([1.0, 0.0])}, "'force' must be a mapping of coordinates"),
         ({"contacts": [BRAKE]}, "'contacts' must be a mapping of names"),
-        ({"contacts": {"brake": "friction"}}, "'brake' must be"),
+        (
+            {"contacts": {"brake": "friction"}},
+            "contacts -> brake: 'contacts' must be a mapping of names to contacts",
+        ),
         ({"parameters": {"w": np.array([0.7]), "S": 0.2}}, "must be a finite number"),
     ],
 )
