@@ -26,6 +26,7 @@ class Motion(Coded):
     HELD = "the solution ends at rest, for ever; the exponents are those of the rest position"
     UNBOUNDED = "the solution grew with no bound in sight; there are no exponents"
     NO_SOLUTION = "no solution starts there, or its events follow each other at once; no exponents"
+    NO_MOTION = NO_SOLUTION  # the earlier name
     OUTSIDE = "the model is not defined at these parameters; there are no exponents"
     MISSING = "not computed: the map was interrupted"
     BROKEN = "the integration of the solution or of its tangent broke off; there are no exponents"

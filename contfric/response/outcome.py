@@ -21,6 +21,7 @@ class Outcome(Coded):
     HELD = "it ends at rest, for ever"
     UNBOUNDED = "it grew with no bound in sight"
     NO_SOLUTION = "no solution starts there, or its events follow each other at once"
+    NO_MOTION = NO_SOLUTION  # the earlier name
     CHATTER = (
         "impacts follow each other faster and faster; it goes on if the reset has chatter: true"
     )
