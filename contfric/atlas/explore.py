@@ -6,7 +6,7 @@ those already known, and a new one puts what leaves it into the queue (:mod:`con
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 
 import numpy as np
@@ -25,7 +25,7 @@ from contfric.base.attributes import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import EndReason
-from contfric.continuation.points import MOST_POINTS, settings_of
+from contfric.continuation.points import MOST_POINTS, Settings, settings_of
 from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError, ParameterError, function_of, truth, whole_number
@@ -115,46 +115,47 @@ def explore(
     orbit = shortest(orbit)
     again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
     most = max(max_periods or MOST_PERIODS, orbit.periods)
-    # multipliers are asked for also where the start itself is on a bridge
-    settings = altered(settings, stability=stability, copies=again, up_to_mirror=True)
-    state = Exploration(settings, most, again, max_branches, bridges, progress)
-    if orbit.periods > (max_periods or MOST_PERIODS):
-        state.notes.append(
-            f"max_periods raised to {orbit.periods}: the start has that many periods"
-        )
     asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
+    raised = f"max_periods raised to {most}: the start has that many periods"
+    notes = [raised] if orbit.periods > (max_periods or MOST_PERIODS) else []
+    ends = float(range[0]), float(range[1])
+    found = _explored(orbit, settings, ends, asked, seeds, progress, notes)
+    divided = with_section(orbit, found.loose_ends) if found.complete else None
+    if divided is None:
+        return found
+    settings = settings_of(divided, parameter, range, max_step, stability, max_points, stop_at)
+    return _explored(divided, settings, ends, asked, seeds, progress, notes)
+
+
+def _explored(
+    orbit: Orbit,
+    settings: Settings,
+    ends: tuple[float, float],
+    asked: Asked,
+    seeds: Seeds | None,
+    progress: Progress | None,
+    notes: Sequence[str],
+) -> Diagram:
+    """Return the diagram that is reached from an orbit between the ends of a range."""
+    # multipliers are asked for also where the start itself is on a bridge
+    settings = altered(settings, stability=asked.stability, copies=asked.copies, up_to_mirror=True)
+    limits = asked.max_periods, asked.copies, asked.max_branches, asked.bridges
+    state = Exploration(settings, *limits, progress)
+    state.notes += notes
     with one_thread():
         # tables that grow as modes are visited belong to one thread
         with nullcontext() if orbit.model.composed else in_advance():
             _follow_from(state, orbit, seeds)
-        found = collect(
+        return collect(
             orbit.model,
             settings,
-            (float(range[0]), float(range[1])),
+            ends,
             state.branches,
             state.events,
             tuple(state.notes),
             state.complete,
             altered(asked, max_periods=state.max_periods, copies=state.copies),
         )
-    divided = with_section(orbit, found.loose_ends) if found.complete else None
-    if divided is None:
-        return found
-    return explore(
-        divided,
-        parameter,
-        range,
-        max_step=max_step,
-        stability=stability,
-        bridges=bridges,
-        max_periods=max_periods,
-        copies=copies,
-        max_branches=max_branches,
-        max_points=max_points,
-        stop_at=stop_at,
-        seeds=seeds,
-        progress=progress,
-    )
 
 
 def _follow_from(state: Exploration, orbit: Orbit, seeds: Seeds | None) -> None:

@@ -68,7 +68,7 @@ def _said(limits: str, what: str) -> str:
 
 #: What pydantic calls a key that a part does not have; the second is no text.
 _UNKNOWN = ("extra_forbidden", "invalid_key")
-#: What it calls a part whose kind is none, and something else in the place of a mapping.
+#: What it calls a part of an unknown kind, and something else in the place of a mapping.
 _NO_KIND = ("union_tag_invalid", "union_tag_not_found")
 _NO_MAPPING = ("dict_type", "model_type", "model_attributes_type")
 

@@ -129,7 +129,7 @@ def _is_at_end(before: Point, after: Point, share: float, settings: Settings) ->
     """Tell whether a slope changes its sign so near to a sliding event that a fold there is a part of it.
 
     Where the parameter stands at the event its slope there is rounding, and Newton's method may fail at the
-    zero of a sign that is none.
+    zero of rounding.
     """
     left = (1.0 - share) * (after.arc - before.arc)
     return left < SAME_FOLD and 0.5 * abs(after.slope) * left < SAME_VALUE * settings.width

@@ -75,7 +75,7 @@ def centre_of(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) -> 
     """Return the centre subspace and the normal form of a Hopf point.
 
     A coefficient that has the parameter as a factor, as that of van der Pol's oscillator, is zero where the
-    parameter is: then rounding of the place gives it a sign, and the other one beside it.
+    parameter is: then rounding of the place gives it a sign, and the other one next to it.
     """
     found = _normal_form(region, y, p, active)
     unit = found.frequency / abs(found.rate) if found.rate else 0.0

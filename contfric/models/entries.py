@@ -62,7 +62,7 @@ def known_keys(keys: Iterable[str], valid: Iterable[str], address: Address) -> N
 
 
 def known_sides(sides: dict[str, int], surfaces: Iterable[str], address: Address) -> dict[str, int]:
-    """Return the sides of surfaces, and refuse those of what is none."""
+    """Return the sides of surfaces, and refuse those of unknown names."""
     names = tuple(surfaces)
     for surface in sides:
         if surface not in names:

@@ -23,7 +23,7 @@ OTHERS: tuple[Place, ...] = (
 
 
 def tree_of(text: str) -> ast.Expression | None:
-    """Return an expression as a tree; None if it is none, of which whoever reads it says what is wrong."""
+    """Return an expression as a tree; None where it is not valid: whoever reads it says why."""
     try:
         return ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):

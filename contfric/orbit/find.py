@@ -116,8 +116,9 @@ def find_orbit(
     checked, time = model.check_params(params), real_number("time", time)
     places = Places(model, checked, at)
     begun = places.begin(state)
-    settled = _settled(model, checked, begun, time, longest, progress=progress)
-    found = places.put(_wanted(settled, periods))
+    found = places.put(
+        _wanted(_settled(model, checked, begun, time, longest, progress=progress), periods)
+    )
     warn_of_sizes(found)
     return found
 

@@ -1,4 +1,4 @@
-"""A fold that a slope of rounding seems to have at a sliding event is none, even where Newton fails at it.
+"""A slope that is rounding at a sliding event makes no fold there, even where Newton fails at it.
 
 Where curves of orbits cross at the end of a bridge the parameter stands, and its slope has either sign there.
 Of bridges of random cases the last step is taken with slopes of either sign at the event, and Newton's method
