@@ -132,6 +132,8 @@ class Model(Shown, TransitionMaps):
         model that is not declared by its equations; None if it has none.
     units : tuple of (str, float)
         The unit of each state, and of the time ``t``, that has one: results are numbers in these units.
+    origins : tuple of (str, str)
+        What a state is measured from, an expression of the parameters, where a symmetry shifts it.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
 
@@ -172,6 +174,7 @@ class Model(Shown, TransitionMaps):
     phase: str = ""
     quantities: tuple[tuple[str, str], ...] = ()
     units: tuple[tuple[str, float], ...] = ()
+    origins: tuple[tuple[str, str], ...] = ()
     ball_factory: Callable[[Mapping[str, Any], str | None], BallModel] | None = field(
         default=None, repr=False
     )
@@ -214,6 +217,8 @@ class Model(Shown, TransitionMaps):
         lines = [f"Model {self.name}: {self.title}", f"  states: {', '.join(self.states)}"]
         if self.units:
             lines.append(f"  in units of: {', '.join(f'{n} {u:g}' for n, u in self.units)}")
+        if self.origins:
+            lines.append(f"  measured from: {', '.join(f'{n} from {c}' for n, c in self.origins)}")
         closed = [f"  closed form: {', '.join(self.closed_form)}"] if self.closed_form else []
         rest = [f"  integrated: {mode} ({reason})" for mode, reason in self.integrated.items()]
         return "\n".join([*lines, f"  parameters: {values}", *closed, *rest])

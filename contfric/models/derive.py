@@ -149,6 +149,7 @@ def as_described(
         "max_step": description.max_step,
         "quantities": description.quantities,
         "units": description.units,
+        "origins": description.origins,
         "definition": description.text,
     }
 

@@ -110,6 +110,7 @@ def _described(data: dict[str, Any]) -> Description:
         quantities=tuple(data["quantities"].items()),
         laws=tuple(ContactLaws(name, **own) for name, own in data["forces"].items()),
         units=tuple(data["in_units"].items()),
+        origins=tuple(data["measured_from"].items()),
         phase=data["phase"],
         structure=data.get("structure", {}),
     )

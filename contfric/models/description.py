@@ -71,6 +71,7 @@ class Description:
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
     units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
+    origins : (state, what it is measured from in all formulas), of a symmetry with a shift
     phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty without one
     structure : what modes are made from when they are visited; empty where all are listed
     """
@@ -104,6 +105,7 @@ class Description:
     quantities: tuple[tuple[str, str], ...] = ()
     laws: tuple[ContactLaws, ...] = ()
     units: tuple[tuple[str, float], ...] = ()
+    origins: tuple[tuple[str, str], ...] = ()
     phase: str = ""
     structure: Mapping[str, Any] = field(default_factory=dict)
 
@@ -154,6 +156,7 @@ class Description:
             "stop_surface": self.stop_surface,
             "quantities": dict(self.quantities),
             "in_units": dict(self.units),
+            "measured_from": dict(self.origins),
             "phase": self.phase,
             STRUCTURE: dict(self.structure),
         }
@@ -189,7 +192,7 @@ class Description:
         """The same of what motion depends on: what only names, explains or measures is left out."""
         parameters = tuple(replace(p, meaning="") for p in self.parameters)
         kept = replace(self, name="model", title="", references=(), parameters=parameters)
-        return replace(kept, max_step=None, quantities=(), laws=(), units=()).text
+        return replace(kept, max_step=None, quantities=(), laws=(), units=(), origins=()).text
 
     @cached_property
     def names(self) -> Names:

@@ -292,6 +292,7 @@ class WrittenOut(ModelFile):
     chatters: dict[str, Chatter] = EMPTY
     forces: dict[str, Law] = EMPTY
     in_units: Units = EMPTY
+    measured_from: Expressions = EMPTY
     alike: list[Texts] = NOTHING
     phase: Text = ""
     structure: StructureFile | None = None

@@ -1,4 +1,4 @@
-"""What a model says in short, written out: ties, clocks, angles, units, sliding, observables.
+"""What a model says in short, written out: ties, shifts, clocks, angles, units, sliding, observables.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """
@@ -13,6 +13,7 @@ from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.angles import with_angles
+from contfric.models.centre import centred
 from contfric.models.clocks import value_at_defaults, with_clock
 from contfric.models.description import Description
 from contfric.models.entries import EntryError, as_identifier
@@ -37,7 +38,8 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     """
     if not data["surfaces"] and not data["modes"] and "field" in data:
         data = {**data, **_smooth(data)}
-    data, parts = _divided_by_resets(_with_observables(_with_period(with_ties_put_in(data))))
+    data = centred(_with_observables(_with_period(with_ties_put_in(data))))
+    data, parts = _divided_by_resets(data)
     walls, data = _chattering(data)
     surfaces, plain = _derived_sliding(_going_on(with_angles(with_clock(data)), data, parts))
     plain = in_units(plain, read)

@@ -132,7 +132,9 @@ def _named(name: str, ties: Mapping[str, str]) -> str:
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:
     """Return a model's data with expressions in the place of parameters."""
     put = Substitution(ties)
-    found = rewritten(data, (*SHARED, *OF_MODES, *OTHERS), lambda text, _: put.text(text))
+    found = rewritten(
+        data, (*SHARED, *OF_MODES, *OTHERS, ("symmetry", None)), lambda text, _: put.text(text)
+    )
     found["parameters"] = {k: v for k, v in data["parameters"].items() if k not in ties}
     found["constraints"] = {put.condition(text): why for text, why in data["constraints"].items()}
     return found

@@ -64,14 +64,30 @@ def in_units(data: dict[str, Any], read: Read) -> dict[str, Any]:
             )
     clocks = filter(is_clock, data["states"])  # times since the last ticks
     units = units | dict.fromkeys(clocks, units.get(TIME, 1.0))
-    found = _states_in_units(plain, units)
+    found = measured(plain, units)
     return _observables_in_units(found, _sizes(read(found))) | {APPLIED: units}
 
 
-def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dict[str, Any]:
-    time = units.get(TIME, 1.0)
+def measured(
+    data: Mapping[str, Any], units: Mapping[str, float], origins: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Return a model's data with states and time in units, and states measured from origins.
+
+    Parameters
+    ----------
+    units : of states and time; 1 if left out
+    origins : expressions of the parameters, by state; 0 if left out. They are in the units of the data
+    """
+    time, origins = units.get(TIME, 1.0), origins or {}
     states = {name: unit for name, unit in units.items() if name != TIME}
-    put = Substitution({n: f"({u!r}*{n})" for n, u in states.items() if u != 1.0})
+
+    def outside(name: str, state: str) -> str:
+        """Return a number of a state in the units of the data."""
+        unit, origin = states.get(state, 1.0), origins.get(state)
+        own = name if unit == 1.0 else f"{unit!r}*{name}"
+        return f"({own} + {origin})" if origin else own if unit == 1.0 else f"({own})"
+
+    put = Substitution({s: outside(s, s) for s in (*states, *origins)})
     rates = {s: f"{time / states.get(s, 1.0)!r}" for s in data["states"]}
     clock = Substitution({TIME: f"({time!r}*{TIME})"} if time != 1.0 else {})
 
@@ -84,6 +100,12 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
     def over(expression: Any, unit: float) -> Any:
         return expression if unit == 1.0 else f"({expression})/{unit!r}"
 
+    def inside(expression: Any, state: str) -> Any:
+        """Return the number that is meant by one in the units of the data."""
+        origin = origins.get(state)
+        from_it = f"({expression}) - {origin}" if origin else expression
+        return over(from_it, states.get(state, 1.0))
+
     found = dict(data)
     for key in ("define", "observables"):
         found[key] = {n: f if n in data["states"] else text(f) for n, f in data[key].items()}
@@ -94,42 +116,37 @@ def _states_in_units(data: Mapping[str, Any], units: Mapping[str, float]) -> dic
         for name, mode in data["modes"].items()
     }
     found["surfaces"] = {
-        name: {**s, "level": over(s["level"], states.get(s["observable"], 1.0))}
+        name: {**s, "level": inside(s["level"], s["observable"])}
         for name, s in data["surfaces"].items()
     }
     found["resets"] = {
-        name: {
-            k: v if k in ("to", "from") else over(text(v), states.get(k, 1.0))
-            for k, v in reset.items()
-        }
+        name: {k: inside(text(v), k) if k in data["states"] else v for k, v in reset.items()}
         for name, reset in data["resets"].items()
     }
     found["spread"] = {
-        s: [over(end, states.get(s, 1.0)) for end in w]
-        if isinstance(w, list)
-        else over(w, states.get(s, 1.0))
+        s: [inside(end, s) for end in w] if isinstance(w, list) else over(w, states.get(s, 1.0))
         for s, w in data["spread"].items()
     }
     if "period" in data:
         found["period"] = over(data["period"], time)
     if "symmetry" in data:
         found["symmetry"] = {
-            n: image if n == TIME else f"({put.text(image)})/{states.get(n, 1.0)!r}"
+            n: image if n == TIME else inside(put.text(image), n)
             for n, image in data["symmetry"].items()
         }
-    return found | _measured(data, text, time, data["states"][0], states)
+    first = data["states"][0]
+    bundled = {name: outside(name, first) for name in ("x_max", "x_min")}
+    return found | _measured(data, text, time, bundled)
 
 
 def _measured(
     data: Mapping[str, Any],
     text: Callable[[Any], str],
     time: float,
-    first: str,
-    states: Mapping[str, float],
+    bundled: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return quantities, and the laws of contacts, in the units of the file."""
-    bundled = {"period": time, "x_max": states.get(first, 1.0), "x_min": states.get(first, 1.0)}
-    outside = Substitution({n: f"({u!r}*{n})" for n, u in bundled.items() if u != 1.0})
+    outside = Substitution(bundled if time == 1.0 else {**bundled, "period": f"({time!r}*period)"})
     quantities = {
         name: outside.text(text(q)).replace("integral(", f"{time!r}*integral(")
         for name, q in data["quantities"].items()

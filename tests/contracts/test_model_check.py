@@ -291,7 +291,7 @@ def test_a_shift_of_differing_frictions_is_an_expression_of_them(tmp_path: Path)
     report = ModelReport("checked")
     check_hidden(report, Probe(cf.load_model(path), {}))
     (finding,) = report.findings
-    assert "x -> S - R - x, v -> -v" in finding.message and "Measure x" in finding.message
+    assert "Declare it, 'symmetry: x -> S - R - x, v -> -v" in finding.message
 
 
 APART = """\

@@ -188,7 +188,7 @@ def _maps_reset(probe: Probe, found: SignChanges, surface: str, image: str) -> b
 def _advice(probe: Probe, found: SignChanges) -> str:
     """Return what the symmetry is, and what can be done with it."""
     beside = list(_beside(probe))
-    texts = _shifts(probe, found, beside)
+    texts, simple = _shifts(probe, found, beside)
     always = all(_is_same(found, hidden_symmetry(other)) for other in beside[:_SETS])
     shown = ", ".join(
         _image(*row) for row in zip(probe.model.states, found.signs, texts, strict=True)
@@ -200,12 +200,10 @@ def _advice(probe: Probe, found: SignChanges) -> str:
             f"at these parameters the model has a symmetry that is not declared: {shown}. Expect that "
             f"{pairs}. It does not hold at parameters near these, so that it cannot be declared"
         )
-    if np.any(found.shift):
-        moved = [s for s, k in zip(probe.model.states, found.shift, strict=True) if k != 0.0]
+    if not simple:
         return (
-            f"the model has a symmetry that is not declared: {shown}. Expect that {pairs}. Measure "
-            f"{' and '.join(moved)} from half of that shift, and it can be declared: mirror images then "
-            "cost nothing"
+            f"the model has a symmetry that is not declared: {shown}. Expect that {pairs}. Write its shift "
+            "as an expression of the parameters, and it can be declared: mirror images then cost nothing"
         )
     return (
         f"the model has a symmetry that is not declared. Declare it, 'symmetry: {shown}', and mirror images "
@@ -236,8 +234,8 @@ def _is_same(found: SignChanges, other: SignChanges | None) -> bool:
     return other is not None and other.signs == found.signs
 
 
-def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> list[str]:
-    """Return the shift of each state as an expression of the parameters, or as a number."""
+def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> tuple[list[str], bool]:
+    """Return the shift of each state as an expression of the parameters, or as a number if one has none."""
     first, rows, values = found.pair[0], [], []
     for other in beside:
         places = list(other.places(first, _DRAWS, _STATES))
@@ -245,13 +243,14 @@ def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> list[str]:
         if shift is not None:
             rows.append([1.0, *other.vector])
             values.append(shift)
-    texts = []
+    texts, simple = [], True
     for i, number in enumerate(found.shift):
         fitted = len(rows) > len(probe.vector) + 1
         column = np.array([shift[i] for shift in values])
         text = _expression(probe.model, np.array(rows), column) if fitted and number else ""
+        simple = simple and bool(text or not number)
         texts.append(text or (f"{number:.12g}" if number else ""))
-    return texts
+    return texts, simple
 
 
 def _expression(model: Model, rows: FloatArray, values: FloatArray) -> str:
