@@ -25,6 +25,7 @@ from contfric.orbit.starts import signs_at
 from contfric.orbit.structure import mode_domains
 from contfric.orbit.system import Itinerary, build_system
 from contfric.signature import canonical_itinerary
+from contfric.signature.cyclic import primitive_length
 
 #: Distances of the motions from the orbit at the event (nondimensional), the nearest first: where a turn
 #: amplifies much only those are guesses that Newton's method takes, where little the others change the
@@ -133,8 +134,11 @@ def _one_turn(
     itinerary, joints, end = without_sections(model, itinerary, joints, end, vector, orbit.periods)
     if len(itinerary) == 1 and is_smooth(model, itinerary) and not model.wraps:
         return None  # a cycle that crosses a section comes back through it: this one has not closed
+    periods = orbit.periods
+    if model.autonomous:  # near a saddle a cycle of the time of this one may have more of them
+        periods = max(periods, len(itinerary) // primitive_length(itinerary))
     try:
-        system = build_system(model, itinerary, orbit.periods)
+        system = build_system(model, itinerary, periods)
     except ValueError:
         return None
     return Orbit(system, clocked(model, joints, end), vector.copy(), np.inf, Status.NOT_CONVERGED)
