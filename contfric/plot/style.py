@@ -119,13 +119,15 @@ _TIMES, _STATES = frozenset({"period"}), frozenset({"x_max", "x_min", "stops"})
 
 
 def _in_units(row: DiagramRow, name: str, model: Model | None) -> DiagramRow:
-    """Return a row whose label says in what unit of the model it is."""
+    """Return a row whose label says in what unit of the model it is, and from where it is measured."""
     units = dict(model.units) if model is not None else {}
+    label = row.label
     if model is not None and name in _STATES:
-        unit = units.get(model.states[0], 1.0)
+        unit, origin = units.get(model.states[0], 1.0), dict(model.origins).get(model.states[0])
+        label += f" from {origin}" if origin else ""
     else:
         unit = units.get("t", 1.0) if name in _TIMES else 1.0
-    return row if unit == 1.0 else DiagramRow(f"{row.label} / {unit:g}", row.even)
+    return DiagramRow(label if unit == 1.0 else f"{label} / {unit:g}", row.even)
 
 
 def row_of(asked: QuantityLike, model: Model | None) -> DiagramRow:

@@ -13,6 +13,7 @@ import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
 from contfric.models.files import from_data, loaded
+from contfric.plot.style import row_of
 from tests.rescaled import put_in
 
 #: Dry friction that depends on the direction of motion, moved by (Sm - Sp)/2.
@@ -154,3 +155,12 @@ def test_a_shift_that_is_no_symmetry_is_refused(symmetry: str, says: str) -> Non
     data = yaml.safe_load(DIRECTED) | {"symmetry": symmetry}
     with pytest.raises(cf.ModelError, match=says):
         from_data(loaded(data, Path()))
+
+
+def test_a_picture_says_from_where_a_state_is_measured() -> None:
+    model = model_of(DIRECTED)
+    assert row_of("x_max", model).label.endswith(f"from {dict(model.origins)['x']}")
+    assert (
+        "from"
+        not in row_of("period", model).label + row_of("x_max", cf.load_model("coulomb")).label
+    )
