@@ -518,3 +518,22 @@ def test_what_is_never_finite_is_refused(text: str) -> None:
 )
 def test_what_is_finite_somewhere_is_not(text: str) -> None:
     assert quantity_of(text, cf.load_model("coulomb")).name == text
+
+
+def test_a_study_names_a_function_of_a_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "measures_of_mine.py").write_text("def width(o):\n    return o.x_max - o.x_min\n")
+    path = tmp_path / "study.yaml"
+    path.write_text(
+        STUDY.replace("x_max: 1.43", "'measures_of_mine:width': 2.85").replace(
+            "energy", "'measures_of_mine:width'"
+        )
+    )
+    with pytest.raises(cf.ContfricError, match=r"study.yaml:6: .*cannot be imported"):
+        cf.run_study(path, out=tmp_path / "run")  # what only lies beside a study brings no code
+    monkeypatch.syspath_prepend(tmp_path)
+    cf.run_study(path, out=tmp_path / "run")
+    branch = cf.load(tmp_path / "run" / "branch.npz")
+    assert branch.quantity("measures_of_mine:width")[-1] == pytest.approx(2.85, abs=1e-9)
+    assert "measures_of_mine:width" in (tmp_path / "run" / "points.csv").read_text()
