@@ -14,6 +14,7 @@ from contfric.base.tabled import stacked
 from contfric.continuation.branch import Branch
 from contfric.continuation.events import Bifurcation, End, Kind, Proposal
 from contfric.models.definition import Model
+from contfric.quantities.registry import QuantityLike
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -98,7 +99,7 @@ class Asked:
     copies: int = 1
     max_branches: int = 200
     max_points: int = 20_000
-    stop_at: tuple[tuple[str, float], ...] = ()
+    stop_at: tuple[tuple[QuantityLike, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

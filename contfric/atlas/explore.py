@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, Settings, settings_of
 from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.continuation.vertices import symmetrised
-from contfric.errors import ConvergenceError, ParameterError, function_of, truth, whole_number
+from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
@@ -50,7 +51,7 @@ def explore(
     copies: int | None = None,
     max_branches: int = 200,
     max_points: int = MOST_POINTS,
-    stop_at: Mapping[str, float] | None = None,
+    stop_at: Mapping[Any, float] | None = None,
     seeds: Seeds | None = None,
     progress: Progress | None = None,
 ) -> Diagram:
@@ -97,12 +98,6 @@ def explore(
     ['0s', '1a', '1a, 7seg, 1hold', '2a', '2s']
     """
     settings = settings_of(orbit, parameter, range, max_step, stability, max_points, stop_at)
-    stops = tuple((asked, value) for asked, value in settings.stop_at if isinstance(asked, str))
-    if len(stops) < len(settings.stop_at):
-        raise ParameterError(
-            "in stop_at a diagram takes quantities by name or expression: files keep what was asked for, "
-            "and no functions"
-        )
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     if copies is not None:
@@ -115,7 +110,9 @@ def explore(
     orbit = shortest(orbit)
     again = copies or (max(max_periods, orbit.periods) if max_periods else 1)
     most = max(max_periods or MOST_PERIODS, orbit.periods)
-    asked = Asked(max_step, stability, bridges, most, again, max_branches, max_points, stops)
+    asked = Asked(
+        max_step, stability, bridges, most, again, max_branches, max_points, settings.stop_at
+    )
     raised = f"max_periods raised to {most}: the start has that many periods"
     notes = [raised] if orbit.periods > (max_periods or MOST_PERIODS) else []
     ends = float(range[0]), float(range[1])

@@ -169,7 +169,7 @@ def _nearest(slopes: FloatArray) -> Iterator[float]:
 
 def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
     """Return the extrema of a quantity along a branch; see :meth:`contfric.Branch.extrema`."""
-    quantity = number_quantity(name, branch.model, "extrema", True)
+    quantity = number_quantity(name, branch.model, "extrema")
     search = _ExtremumSearch(branch, quantity, _settings(branch))
     found: list[Extremum] = []
     points = list(_points(branch, search))

@@ -349,6 +349,6 @@ def _stops(model: Model, stop_at: object) -> tuple[tuple[QuantityLike, float], .
     return tuple(
         (found.asked, real_number(f"stop_at['{found.name}']", value))
         for found, value in (
-            (number_quantity(name, model, "stop_at", True), value) for name, value in given.items()
+            (number_quantity(name, model, "stop_at"), value) for name, value in given.items()
         )
     )

@@ -178,12 +178,14 @@ def _dip(a: float, b: float, before: Point, after: Point, sought: _Sought) -> fl
     By the cubic that has values a and b, of one sign, and the slopes at both ends. It is asked for where
     it comes within a tenth of the nearer end, as a cubic is no more than that.
     """
+    if not np.isfinite([a, b]).all():
+        return None
     sign, length = float(np.sign(a)), after.arc - before.arc
     p = length * sought.slope(before)
     if sign * p >= 0.0:
         return None
     q = length * sought.slope(after)
-    if sign * q <= 0.0 or not np.isfinite([a, b, p, q]).all():
+    if sign * q <= 0.0 or not np.isfinite([p, q]).all():
         return None
     cubic = np.polynomial.Polynomial([a, p, 3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q])
     roots = np.asarray(cubic.deriv().roots(), dtype=np.complex128)

@@ -42,8 +42,8 @@ from contfric.models.definition import FloatArray
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
-from contfric.quantities.measure import differentiated, of_orbit
-from contfric.quantities.registry import Quantity, number_quantity
+from contfric.quantities.measure import differentiated, of_orbit, of_orbits
+from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 
 #: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
 _STEP = 6e-6
@@ -67,10 +67,13 @@ class ExtremumCurve(QuantityCurve):
     True
     """
 
+    #: The quantity at every point, where it is a user's function: a file does not keep that.
+    of_function: FloatArray | None = None
+
     @property
     def extrema(self) -> FloatArray:
         """The quantity at every point, shape (k,)."""
-        return self.measured(self.quantity)
+        return self.measured(self.quantity) if self.of_function is None else self.of_function
 
     def _at_points(self) -> FloatArray | float:
         return self.extrema
@@ -126,6 +129,8 @@ class Stationary(Held):
     def defects(self, orbit: Orbit) -> Defects:
         """Return these derivatives, with their rows by secants."""
         x, values, known = self.scaled(orbit), self.slopes(orbit), self.secants
+        if self._blurred and known.rows is not None and np.max(np.abs(values)) < _FOUND:
+            return Defects(np.zeros_like(values), known.rows)  # what is left is their error
         known.calls += 1
         if known.rows is None or known.calls > _SECANTS:
             known.rows, known.calls = self._differences(x, orbit), 0
@@ -137,6 +142,11 @@ class Stationary(Held):
             known.calls = 0
         known.x, known.values = x, values
         return Defects(values, known.rows)
+
+    @property
+    def _blurred(self) -> bool:
+        """Whether the slopes are differences, of a user's function: good to 1e-10, and not to rounding."""
+        return self.quantity is not None and self.quantity.function is not None
 
     def _differences(self, x: FloatArray, orbit: Orbit) -> FloatArray:
         """Return rows with the slopes of the conditions in the tangent plane of the orbits."""
@@ -151,7 +161,7 @@ class Stationary(Held):
 
 def continue_extremum(
     start: Orbit | Extremum,
-    quantity: str,
+    quantity: QuantityLike,
     parameters: tuple[str, ...],
     ranges: Mapping[str, tuple[float, float]],
     *,
@@ -169,8 +179,8 @@ def continue_extremum(
     start : Orbit or Extremum
         Where to start: an extremum of a branch, or any orbit. From an orbit the branch in the first
         parameter is followed to its nearest extremum, then that extremum in the second parameter.
-    quantity : str
-        A quantity by its name or as an expression, such as ``"x_max"``.
+    quantity : str or callable
+        A quantity by its name or as an expression, such as ``"x_max"``, or a function of an orbit.
     parameters : (str, ...)
         The parameters that vary; in all but the last one the quantity is stationary.
     ranges : dict
@@ -227,7 +237,9 @@ def continue_extremum(
     held, first = _start(orbit, measured, box, progress)
     found = both_sides(held, first, largest, max_points, progress)
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}
-    return ExtremumCurve(**{**values, "value": float(of_orbit(measured, held.orbit_of(first)))})
+    values["value"] = float(of_orbit(measured, held.orbit_of(first)))
+    of_function = None if measured.function is None else of_orbits(measured, found)
+    return ExtremumCurve(**values, of_function=of_function)
 
 
 def _start(
@@ -253,7 +265,7 @@ def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges, progress: Progress | 
     if len(names) == 1:
         bounds = float(box.low[0]), float(box.high[0])
         branch = continue_orbit(orbit, last, bounds, stability=False, progress=progress)
-        found = [e for e in branch.extrema(quantity.name) if not e.kink]
+        found = [e for e in branch.extrema(quantity.asked) if not e.kink]
         if not found:
             raise ConvergenceError(
                 f"{quantity.name} has no extremum along {last} in {bounds}", orbit
@@ -264,7 +276,7 @@ def _nearer(orbit: Orbit, quantity: Quantity, box: Ranges, progress: Progress | 
     held, first = _start(orbit, quantity, inner, progress)
     largest = largest_step(None, orbit.model)
     curve = both_sides(held, first, largest, MOST_POINTS, progress)
-    values = curve.measured(quantity.name)
+    values = curve.measured(quantity.asked)
     turns = np.flatnonzero(np.diff(values[1:]) * np.diff(values[:-1]) <= 0.0) + 1
     if not len(turns):
         raise ConvergenceError(

@@ -102,7 +102,7 @@ def continue_quantity(
     """
     if not isinstance(orbit, Orbit):
         raise ParameterError(f"continuation starts from an Orbit, got {type(orbit).__name__}")
-    held_quantity = number_quantity(quantity, orbit.model, "a curve", True)
+    held_quantity = number_quantity(quantity, orbit.model, "a curve")
     value = real_number("value", value)
     box = box_of(orbit.model, parameters, ranges)
     largest = largest_step(max_step, orbit.model)

@@ -31,7 +31,7 @@ from contfric.errors import (
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.quantities.registry import number_quantity
+from contfric.quantities.registry import QuantityLike, number_quantity
 from contfric.remember.folder import kept_in
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def ensemble(
     *,
     samples: int | None = None,
     seed: int = 0,
-    row: str = "x_max",
+    row: QuantityLike = "x_max",
     values: int | ArrayLike = 101,
     max_step: float | None = None,
     bridges: bool = True,
@@ -130,7 +130,7 @@ def ensemble(
     model.index_of(parameter)
     bounds = checked_range(parameter, range)
     varied = checked_distributions(model, distributions, parameter)
-    number_quantity(row, model, "an ensemble")
+    row = number_quantity(row, model, "an ensemble").asked
     count = whole_number("samples", 1000 if samples is None else samples, least=1)
     grid = _values(parameter, bounds, values)
     must_fit(f"an ensemble of {count} diagrams at {len(grid)} values", count * len(grid) * _BYTES)

@@ -17,6 +17,7 @@ from contfric.ensembles.rows import Drawn, Rows, by_sample
 from contfric.ensembles.statistics import SobolIndices, share_of, sobol_indices
 from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.definition import FloatArray, Model
+from contfric.quantities.registry import QuantityLike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,7 +136,7 @@ class Ensemble(Shown):
     parameter, range : what the diagrams are along, and where
     vector : ndarray, shape (parameters,)
         The parameters; those that vary at their medians.
-    row : str
+    row : str or callable
         The quantity that is kept at ``values``.
     values : ndarray
         Values of the parameter.
@@ -161,7 +162,7 @@ class Ensemble(Shown):
     parameter: str
     range: tuple[float, float]
     vector: FloatArray
-    row: str
+    row: QuantityLike
     values: FloatArray
     distributions: dict[str, str]
     seed: int
@@ -283,7 +284,9 @@ class Ensemble(Shown):
         for k, part in enumerate(by_sample(rows.orbit_index[chosen], count)):
             at = chosen[part]
             if len(at):
-                quantiles[:, k] = np.nanquantile(rows.orbit_row[at], shares)
+                measured = rows.orbit_row[at]
+                finite = measured[np.isfinite(measured)]
+                quantiles[:, k] = np.quantile(finite, shares) if len(finite) else np.nan
                 orbits[k], samples[k] = len(at), len(np.unique(rows.orbit_sample[at]))
         return Band(name, stable, quantiles, orbits, samples)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from contfric.ensembles.ensemble import QUANTILES
 from contfric.ensembles.rows import Drawn
+from contfric.quantities.registry import name_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,5 +105,10 @@ def dataset_of(found: Ensemble) -> xr.Dataset:
             "quantile": list(QUANTILES),
             found.parameter: found.values,
         },
-        attrs={"model": found.model.name, "row": found.row, "seed": found.seed, **found.params},
+        attrs={
+            "model": found.model.name,
+            "row": name_of(found.row),
+            "seed": found.seed,
+            **found.params,
+        },
     )

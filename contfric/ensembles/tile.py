@@ -24,7 +24,7 @@ from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import IntArray
 from contfric.quantities.measure import of_branch, of_orbit
-from contfric.quantities.registry import Quantity, quantity_of
+from contfric.quantities.registry import Quantity, QuantityLike, quantity_of
 from contfric.remember.advance import cores_are_busy
 
 #: Values of the parameter at which an orbit to begin with is looked for: the one given, then others, spread
@@ -65,7 +65,7 @@ class EnsembleTile(TileTask):
     vectors: FloatArray
     parameter: str
     range: tuple[float, float]
-    row: str
+    row: QuantityLike
     values: FloatArray
     options: dict[str, Any]
 
@@ -297,6 +297,7 @@ def _nodes(
     order = np.argsort(arc, kind="stable")
     order = order[np.concatenate([[True], np.diff(arc[order]) > 0.0])]
     arc, both, stable = arc[order], np.array([at, *rows])[:, order], stable[order]
+    both[~np.isfinite(both)] = np.nan  # multipliers of holds: no band has them
     # after an event a branch is as stable as at its next point
     points = np.flatnonzero(stable != -2)
     following = points[np.minimum(np.searchsorted(points, np.arange(len(arc))), len(points) - 1)]

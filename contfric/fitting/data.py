@@ -13,6 +13,7 @@ from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
     from contfric.continuation.events import Bifurcation
+    from contfric.quantities.registry import QuantityLike
 
 
 def _positive(sigma: object) -> float:
@@ -26,8 +27,8 @@ class Measured:
 
     Parameters
     ----------
-    quantity : str
-        What was measured, by its name or as an expression, such as ``"x_max"``.
+    quantity : str or callable
+        What was measured, by its name or as an expression, such as ``"x_max"``, or a function of an orbit.
     value : float
         What came out.
     sigma : float
@@ -41,7 +42,7 @@ class Measured:
     'x_max'
     """
 
-    quantity: str
+    quantity: QuantityLike
     value: float
     sigma: float
     params: Mapping[str, float] = field(default_factory=dict)

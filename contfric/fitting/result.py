@@ -15,6 +15,7 @@ from contfric.fitting.condition import Datum
 from contfric.fitting.data import Jump, Series
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.orbit import Orbit
+from contfric.quantities.registry import name_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -178,4 +179,4 @@ def what_of(datum: Datum) -> str:
     """Return what was measured, in a word: a quantity, a signal, or an event."""
     if isinstance(datum, Jump):
         return f"{datum.parameter} of {datum.event.label}"
-    return datum.signal if isinstance(datum, Series) else datum.quantity
+    return datum.signal if isinstance(datum, Series) else name_of(datum.quantity)

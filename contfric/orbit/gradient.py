@@ -88,7 +88,7 @@ class Gradient(Tabled, Mapping[str, float]):
 
 def gradient_of(orbit: Orbit, name: QuantityLike) -> Gradient:
     """Return the derivatives of a quantity by every parameter; see :meth:`contfric.Orbit.gradient`."""
-    quantity = number_quantity(name, orbit.model, "a gradient", True)
+    quantity = number_quantity(name, orbit.model, "a gradient")
     found = differentiated(quantity, orbit, by_parameters(orbit))
     return _gradient(orbit, quantity.name, found, _events(orbit))
 
@@ -96,7 +96,7 @@ def gradient_of(orbit: Orbit, name: QuantityLike) -> Gradient:
 def gradients_of(orbit: Orbit, names: Iterable[QuantityLike]) -> dict[str, Gradient]:
     """Return the derivatives of several quantities; see :meth:`contfric.Orbit.gradients`."""
     every = many("gradients", names)
-    quantities = [number_quantity(name, orbit.model, "a gradient", True) for name in every]
+    quantities = [number_quantity(name, orbit.model, "a gradient") for name in every]
     found = differentiated_at_once(quantities, orbit, by_parameters(orbit))
     events = _events(orbit)
     return Named(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from contfric.errors import ParameterError
 from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import (
@@ -19,6 +20,7 @@ from contfric.plot.style import (
     row_of,
     sized,
 )
+from contfric.quantities.registry import name_of
 
 if TYPE_CHECKING:
     from contfric.ensembles.ensemble import Ensemble
@@ -70,10 +72,16 @@ def plot_ensemble(found: Ensemble, ax: Axes | None = None, *, bridges: bool = Fa
         ax.plot(found.values, middle, color=colour, ls=style, lw=LINE_WIDTH, label=label)
     _draw_events(ax, found)
     ax.set_xlim(*found.range)
-    label = row_of(found.row, found.model).name(found.model.states[0])
-    name_axes(ax, parameter_label(found.parameter), label)
+    name_axes(ax, parameter_label(found.parameter), _row_label(found))
     ax.legend(fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     return ax
+
+
+def _row_label(found: Ensemble) -> str:
+    try:
+        return row_of(found.row, found.model).name(found.model.states[0])
+    except ParameterError:  # a user's function, which its file does not keep
+        return name_of(found.row)
 
 
 def _draw_events(ax: Axes, found: Ensemble) -> None:

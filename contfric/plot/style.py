@@ -145,7 +145,7 @@ def row_of(asked: QuantityLike, model: Model | None) -> DiagramRow:
     if model is None or (word and asked not in names):
         raise ParameterError(f"no row '{asked}' in a diagram{did_you_mean(asked, names)}")
     found = quantity_of(asked, model)
-    label = found.name if found.named is None else found.named.label
+    label = found.name.rpartition(":")[-1] if found.named is None else found.named.label
     return DiagramRow(label, found.even)
 
 

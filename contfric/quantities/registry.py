@@ -2,14 +2,17 @@
 
 A quantity is one of the bundled names, one that the model's file declares, an expression
 (:mod:`contfric.models.quantity_texts`), or a function of an orbit. It is looked up and checked here, before
-anything is computed.
+anything is computed. A function that can be imported has a name, too, ``module:function``: files, studies and
+other processes ask for it by that.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,6 +71,8 @@ NAMED = {
 #: Trials of an expression with random values, and the powers of ten between which their sizes lie: so
 #: log(x - 500) and acos(500*x) have values at one trial in ten.
 _DRAWS, _SIZES = 200, (-6.0, 6.0)
+#: The name of a function that can be imported: no expression has a colon.
+_IMPORTABLE = re.compile(r"\w+(\.\w+)*:\w+(\.\w+)*")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +100,8 @@ class Quantity:
 
     @property
     def asked(self) -> QuantityLike:
-        """What it can be asked for by again."""
-        return self.function or self.name
+        """What it can be asked for by again; a text wherever there is one."""
+        return self.name if self.function is None else _import_name(self.function) or self.function
 
     @property
     def several(self) -> bool:
@@ -131,31 +136,31 @@ def quantity_of(asked: QuantityLike, model: Model) -> Quantity:
     if isinstance(asked, str):
         return _quantity_of(asked.strip(), model)
     if callable(asked):
-        name = getattr(asked, "__name__", "function")
-        return Quantity(name.strip("<>"), model, None, asked)  # "<lambda>" is no label of an axis
+        return Quantity(name_of(asked), model, None, asked)
     raise ParameterError(
         f"a quantity is a name, an expression such as 'max(x) - min(x)', or a function of an orbit; got "
         f"{shown(asked)}"
     )
 
 
-def number_quantity(asked: object, model: Model, what: str, functions: bool = False) -> Quantity:
-    """Return a quantity that is one number given by name or expression; ``what`` asks for it.
+def name_of(asked: QuantityLike) -> str:
+    """Return what a quantity is called in tables, on axes and in files."""
+    name = asked if isinstance(asked, str) else getattr(asked, "__name__", "function")
+    return name.strip("<>")  # "<lambda>" is no label of an axis
 
-    Parameters
-    ----------
-    functions : whether it may be a function of an orbit: not where it is written to files
+
+def number_quantity(asked: Any, model: Model, what: str) -> Quantity:
+    """Return a quantity that is one number; ``what`` asks for it.
 
     Raises
     ------
     ParameterError
-        If it is a list of numbers, or a function where it may not be one.
+        If there is none, or it is a list of numbers.
     """
-    if functions and callable(asked):
-        return quantity_of(asked, model)
-    if not isinstance(asked, str):
+    if not isinstance(asked, str) and not callable(asked):
         raise ParameterError(
-            f"{what} takes a quantity by name or expression, such as 'x_max' or 'rms(v)', got {shown(asked)}"
+            f"{what} takes a quantity: a name, an expression such as 'rms(v)', or a function of an orbit; "
+            f"got {shown(asked)}"
         )
     found = quantity_of(asked, model)
     if found.several:
@@ -203,8 +208,43 @@ def quantity_names(model: Any) -> list[str]:
     return [*NAMED, *(name for name, _ in load_model(model).quantities)]
 
 
+def _imported(name: str) -> Callable[[Orbit], Any]:
+    """Return a function by its name, ``module:function``.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be imported.
+    """
+    module, _, path = name.partition(":")
+    try:
+        found = reduce(getattr, path.split("."), import_module(module))
+    except Exception as error:  # the user's own code: any kind of failure
+        raise ParameterError(
+            f"quantity '{name}': the function cannot be imported ({type(error).__name__}: {error}); its "
+            "module has to be installed, or lie in a folder of PYTHONPATH"
+        ) from error
+    if not callable(found):
+        raise ParameterError(f"quantity '{name}' is no function, but {shown(found)}")
+    return found
+
+
+def _import_name(function: Callable[[Orbit], Any]) -> str:
+    """Return the name that a function can be imported by, in other processes too; empty if it has none."""
+    module = getattr(function, "__module__", None) or ""
+    name = f"{module}:{getattr(function, '__qualname__', '')}"
+    if module == "__main__" or not _IMPORTABLE.fullmatch(name):
+        return ""
+    try:
+        return name if _imported(name) is function else ""
+    except ParameterError:
+        return ""
+
+
 @lru_cache(maxsize=512)
 def _quantity_of(text: str, model: Model) -> Quantity:
+    if _IMPORTABLE.fullmatch(text):
+        return Quantity(text, model, None, _imported(text))
     named = NAMED.get(text)
     if named is not None and named.several:
         return Quantity(text, model, None)

@@ -19,7 +19,7 @@ from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
 from contfric.chaos.tiles import inside
 from contfric.chaos.work import TileTask
-from contfric.errors import ParameterError, function_of, real_number, shown
+from contfric.errors import ParameterError, function_of, real_number, shown, truth
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
@@ -137,7 +137,7 @@ def sweep(
     skipped = real_number("transient", transient, least=0.0)
     span = skipped + positive("periods", periods)
     if both is not None:
-        direction = "both" if both else "up"
+        direction = "both" if truth("both", both) else "up"
     if direction not in [*_DIRECTIONS]:
         raise ParameterError(
             f"direction is one of {', '.join(_DIRECTIONS)}, got {shown(direction)}"

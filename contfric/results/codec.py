@@ -9,6 +9,7 @@ an earlier version has not written has its default.
 from __future__ import annotations
 
 from dataclasses import MISSING, Field, fields
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.simulation import Trajectory
 from contfric.orbit.system import System, build_system
+from contfric.quantities.registry import name_of
 from contfric.remember.stored import Reader, UnstorableError, Writer, made_of
 
 Arrays = dict[str, NDArray[Any]]
@@ -44,6 +46,10 @@ class ResultWriter(Writer):
         self._model, self._field_name = model, ""
 
     def _node(self, value: Any) -> Any:
+        if isinstance(
+            value, FunctionType
+        ):  # a quantity: what it was called lasts, and not what it does
+            value = name_of(value)
         if type(value) is System:  # those of one itinerary are one
             self._node(value.model)
             asked = value.itinerary, value.periods, value.half, value.domains

@@ -19,6 +19,9 @@ from contfric.curves.curve import Curve
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.ensembles.ensemble import Ensemble
 from contfric.ensembles.tables import events_table, samples_table
+from contfric.equilibria.branch import EquilibriumBranch
+from contfric.equilibria.events import EquilibriumEvent
+from contfric.equilibria.explore import EquilibriumDiagram
 from contfric.fitting.result import Fit
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
@@ -32,7 +35,11 @@ from contfric.response.sweep import Sweep
 OneTable: TypeAlias = (
     Sweep | Returns | ReleaseMap | Basins | StableSet | LyapunovMap | QuantityCurve | Fit
 )
-Exported: TypeAlias = Orbit | Branch | Diagram | Curve | Plane | Trajectory | Ensemble | OneTable
+#: Results of which each branch is a table, with its events.
+Equilibria: TypeAlias = EquilibriumBranch | EquilibriumDiagram
+Exported: TypeAlias = (
+    Orbit | Branch | Diagram | Curve | Plane | Trajectory | Ensemble | Equilibria | OneTable
+)
 
 
 @dataclass
@@ -89,6 +96,9 @@ def points_of(x: Exported) -> Columns:
         return _table(samples_table(x), x.model)
     if isinstance(x, Trajectory):
         return _table(x.columns(), x.model)
+    if isinstance(x, Equilibria):
+        parts = [x] if isinstance(x, EquilibriumBranch) else x.branches
+        return stacked([_equilibria(branch, k) for k, branch in enumerate(parts, start=1)])
     if isinstance(x, Tabled):
         return _table(x.columns(), x.model, x.length_columns, x.time_columns)
     return stacked([_branch(branch, k) for k, branch in enumerate(x.branches, start=1)])
@@ -96,6 +106,8 @@ def points_of(x: Exported) -> Columns:
 
 def events_of(x: Exported) -> Columns | None:
     """Return the events of a branch, a diagram or an ensemble, or the special points of curves; else None."""
+    if isinstance(x, Equilibria):
+        return stacked([_event_at_rest(event) for event in x.events])
     if isinstance(x, Orbit | Tabled | Trajectory):
         return None
     if isinstance(x, Ensemble):
@@ -189,6 +201,23 @@ def _event(event: Bifurcation, branches: Sequence[str], names: Sequence[str]) ->
     if not event.orbit.system.holds:
         table.multipliers(event.orbit.multipliers[None, :])
     return table
+
+
+def _equilibria(branch: EquilibriumBranch, number: int) -> Columns:
+    count = len(branch)
+    fixed = {name: np.broadcast_to(value, count) for name, value in branch.params.items()}
+    return _table({"branch": np.full(count, number), **fixed, **branch.columns()}, branch.model)
+
+
+def _event_at_rest(event: EquilibriumEvent) -> Columns:
+    model, rest = event.equilibrium.model, event.equilibrium
+    columns: dict[str, Any] = {"label": [event.label], "kind": [event.kind.value]}
+    columns |= {name: [value] for name, value in event.params.items()}
+    columns |= {name: [value] for name, value in zip(model.states, rest.state, strict=True)}
+    for name in ("stable_before", "stable_after"):
+        stable = getattr(event, name)
+        columns[name] = [np.nan if stable is None else float(stable)]
+    return _table(columns, model)
 
 
 def _curve(curve: Curve, number: int) -> Columns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -168,7 +169,23 @@ def _params(located: LocatedYaml, content: StudyFile, model: Model) -> dict[str,
     try:
         return model.check_params(content.params)
     except ParameterError as error:
+        if (params := _replaced(content, model)) is not None:
+            return params
         located.fail(("params", *_violated(content, model)), str(error))
+
+
+def _replaced(content: StudyFile, model: Model) -> dict[str, float] | None:
+    """Return all parameters, where no default is used that cannot go with the others; None if one is.
+
+    A sweep, say, does not use that of its own parameter.
+    """
+    try:
+        tasks = [task.replaced() for task in content.given]
+        shared = [n for n in chain(*tasks[:1]) if all(n in others for others in tasks[1:])]
+        instead = {n: tasks[0][n] for n in shared if n not in content.params}
+        return model.check_params({**instead, **content.params}) if instead else None
+    except ParameterError:
+        return None
 
 
 def _violated(content: StudyFile, model: Model) -> list[str]:

@@ -213,3 +213,21 @@ def test_units_of_columns_are_those_of_the_model(tmp_path: Path) -> None:
     releases = cf.release_map(scaled, PARAMS, count=20)
     _, units = read_csv(cf.export(releases, tmp_path / "r.csv")[0])
     assert (units["phase"], units["time"], units["branch"]) == ("0.004", "0.004", "1")
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mat"])
+def test_equilibria_with_their_events(suffix: str, tmp_path: Path) -> None:
+    found = cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0}, values=2)
+    for result in (found, found.branches[0]):
+        files = cf.export(result, tmp_path / f"rest.{suffix}")
+        if suffix == "csv":
+            (points, _), (events, _) = map(read_csv, files)
+        else:
+            both = read_mat(files[0])
+            points = {name: np.atleast_1d(x).tolist() for name, x in both["points"].items()}
+            events = {name: np.atleast_1d(x).tolist() for name, x in both["events"].items()}
+        branches = found.branches if result is found else found.branches[:1]
+        values = np.concatenate([branch.values for branch in branches])
+        assert [float(a2) for a2 in points["a2"]] == values.tolist()
+        assert [float(e) for e in events["a2"]] == [event.value for event in result.events]
+        assert events["kind"] == [event.kind.value for event in result.events] != []

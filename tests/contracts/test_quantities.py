@@ -83,6 +83,79 @@ def test_functions_count_and_must_return_numbers(orbit: cf.Orbit, branch: cf.Bra
                 ask(wrong)
 
 
+def width_of(orbit: cf.Orbit) -> float:
+    return orbit.x_max - orbit.x_min
+
+
+#: The same function by itself, by the name of its module, and one that no other process can import.
+WIDTHS = {
+    "function": width_of,
+    "text": f"{__name__}:width_of",
+    "lambda": lambda o: o.x_max - o.x_min,
+}
+
+
+@pytest.fixture(scope="module")
+def peaked() -> cf.Orbit:
+    return cf.find_orbit("coulomb", {"Omega": 0.9, "S": 0.2, "S0": 0.25, "zeta": 0.1})
+
+
+@pytest.mark.parametrize("width", WIDTHS.values(), ids=WIDTHS)
+def test_a_function_of_an_orbit_is_used_as_its_expression_is(
+    peaked: cf.Orbit, width: Any, tmp_path: Path
+) -> None:
+    """In diagrams, curves of extrema, fits and ensembles, and after they were saved."""
+    text, bounds = "x_max - x_min", (0.8, 1.1)
+    stopped = [cf.explore(peaked, "Omega", bounds, stop_at={q: 6.5}) for q in (width, text)]
+    ends = [sorted(float(v) for b in d.branches for v in b.values[[0, -1]]) for d in stopped]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert any(0.81 < end < 1.09 for end in ends[0])
+
+    ranges = {"Omega": bounds, "S": (0.18, 0.22)}
+    peaks, expected = (
+        cf.continue_extremum(peaked, q, ("Omega", "S"), ranges, max_points=6) for q in (width, text)
+    )
+    at = np.interp(peaks.params["S"], *_by_s(expected, expected.params["Omega"]))
+    assert np.max(np.abs(peaks.params["Omega"] - at)) < 1e-4  # between points of the other curve
+    assert max(abs(orbit.gradient(text)["Omega"]) for orbit in peaks) < 1e-7
+
+    datum = [cf.Measured(width, peaked.quantity(text), 0.01)]
+    fitted = cf.fit("coulomb", datum, {**peaked.params, "S": 0.21}, ["S"])
+    assert fitted.params["S"] == pytest.approx(0.2, abs=1e-9)
+
+    box = {"S": (0.19, 0.21)}
+    fixed = {n: v for n, v in peaked.params.items() if n != "S"}
+    drawn, same = (
+        cf.ensemble("coulomb", "Omega", bounds, box, fixed, samples=2, row=q) for q in (width, text)
+    )
+    assert np.allclose(drawn.rows.orbit_row, same.rows.orbit_row, rtol=0, atol=1e-12)
+
+    for k, result in enumerate((stopped[0], peaks, fitted, drawn)):
+        path = tmp_path / f"{k}.npz"
+        cf.save(result, path)
+        again = cf.load(path)
+        again.plot()
+        assert again.to_dataframe().equals(result.to_dataframe())
+    assert np.array_equal(cf.load(tmp_path / "1.npz").extrema, peaks.extrema)
+
+
+def _by_s(curve: cf.ExtremumCurve, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(curve.params["S"])
+    return curve.params["S"][order], column[order]
+
+
+def test_infinite_multipliers_stop_nothing_and_stand_in_no_band(orbit: cf.Orbit) -> None:
+    found = cf.explore(orbit, "Omega", (0.48, 0.55), stop_at={"multiplier": 0.9})
+    assert any(end.reason.name == "STOP" for b in found.branches for end in b.ends)
+    assert any(b.bridge for b in found.branches)
+    fixed = {"Omega": 0.5, "S0": 0.4}
+    drawn = cf.ensemble(
+        "coulomb", "Omega", (0.48, 0.55), {"S": (0.31, 0.33)}, fixed, samples=2, row="multiplier"
+    )
+    assert not np.any(np.isinf(drawn.rows.orbit_row))
+    assert any(np.isfinite(band.quantiles).any() for band in drawn.bands())
+
+
 def test_a_branch_has_the_values_of_its_orbits(branch: cf.Branch) -> None:
     for name in ("x_max", "psi", "energy", "rms(v)", "multiplier", "period"):
         values = branch.quantity(name)
@@ -286,8 +359,10 @@ def test_a_diagram_stops_at_the_same_orbits_for_either_mirror_image(
         ({"xmax": 1.4}, "has no quantity 'xmax'"),
         ({"x_max": "high"}, "stop_at['x_max'] is a finite number"),
         ("x_max", "stop_at is a mapping, such as {'x_max': 1.4}"),
-        ({3: 1.4}, "stop_at takes a quantity by name or expression"),
-        ({len: 1.4}, "the function len of an orbit raised TypeError"),
+        ({3: 1.4}, "stop_at takes a quantity: a name, an expression such as"),
+        ({"nowhere:width": 1.4}, "the function cannot be imported (ModuleNotFoundError"),
+        ({"math:pi": 1.4}, "quantity 'math:pi' is no function, but 3.14"),
+        ({len: 1.4}, "the function builtins:len of an orbit raised TypeError"),
         ({"stops": 1.4}, "takes a quantity that is one number"),
     ],
 )
@@ -443,3 +518,22 @@ def test_what_is_never_finite_is_refused(text: str) -> None:
 )
 def test_what_is_finite_somewhere_is_not(text: str) -> None:
     assert quantity_of(text, cf.load_model("coulomb")).name == text
+
+
+def test_a_study_names_a_function_of_a_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "measures_of_mine.py").write_text("def width(o):\n    return o.x_max - o.x_min\n")
+    path = tmp_path / "study.yaml"
+    path.write_text(
+        STUDY.replace("x_max: 1.43", "'measures_of_mine:width': 2.77").replace(
+            "energy", "'measures_of_mine:width'"
+        )
+    )
+    with pytest.raises(cf.ContfricError, match=r"study.yaml:6: .*cannot be imported"):
+        cf.run_study(path, out=tmp_path / "run")  # what only lies beside a study brings no code
+    monkeypatch.syspath_prepend(tmp_path)
+    cf.run_study(path, out=tmp_path / "run")
+    branch = cf.load(tmp_path / "run" / "branch.npz")
+    assert branch.quantity("measures_of_mine:width")[-1] == pytest.approx(2.77, abs=1e-9)
+    assert "measures_of_mine:width" in (tmp_path / "run" / "points.csv").read_text()

@@ -692,3 +692,30 @@ def test_force_removes_the_figures_of_another_study(tmp_path: Path) -> None:
     assert (out / "own.png").is_file()
     cf.run_study(plain, out, force=True)
     assert not (out / "own.png").exists()
+
+
+#: Tasks that do not use the default of S, which is above the S0 of the study.
+DRAWN = "ensemble: {parameter: Omega, range: [0.5, 0.52], samples: 1, distributions: "
+REPLACING = {
+    "sweep": "sweep: {parameter: S, values: [0.1, 0.2, 3], periods: 5, transient: 5}",
+    "lyapunov": "lyapunov: {grid: {Omega: [0.3, 0.4, 2], S: [0.1, 0.2, 2]}, periods: 20}",
+    "ensemble": DRAWN + "{S: [0.1, 0.12]}}",
+    "normal": DRAWN + "{S: {norm: [0.1, 0.01]}}}",
+}
+#: Tasks that use it.
+USING = (
+    "continue: {parameter: Omega, range: [0.4, 0.6]}",
+    "basins: {grid: {x: [0, 1, 2], v: [0, 1, 2]}}",
+)
+
+
+@pytest.mark.parametrize("task", REPLACING.values(), ids=REPLACING)
+def test_a_default_that_no_task_uses_contradicts_nothing(task: str, tmp_path: Path) -> None:
+    path, words = tmp_path / "study.yaml", r"study.yaml:3: model 'coulomb' needs S0 >= S"
+    text = f"title: t\nmodel: coulomb\nparams: {{Omega: 0.5, S0: 0.25}}\n{task}\n"
+    path.write_text(text)
+    assert cf.run_study(path, out=tmp_path / "run").status is RunStatus.DONE
+    for other in (*(f"{text}{use}\n" for use in USING), text.replace("0.25}", "0.25, S: 0.3}")):
+        path.write_text(other)
+        with pytest.raises(cf.ContfricError, match=words):
+            read_study(path)

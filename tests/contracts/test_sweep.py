@@ -290,6 +290,12 @@ def test_bad_study(write, tmp_path: Path, text: str, message: str) -> None:
         cf.run_study(path, tmp_path / "out")
 
 
+@pytest.mark.parametrize("both", ["yes", 1, 0.0])
+def test_both_is_true_or_false(both: Any) -> None:
+    with pytest.raises(cf.ParameterError, match="both is True or False, got"):
+        cf.sweep("coulomb", "Omega", [0.4, 0.5], both=both)
+
+
 def test_both_is_direction_in_one_word() -> None:
     values, fixed = GRID[:6], {"S": 0.32, "S0": 0.4}
     for both, direction in ((True, "both"), (False, "up")):

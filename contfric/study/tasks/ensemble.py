@@ -103,6 +103,13 @@ class EnsembleTask(Response, AlongParameter):
                 raise ParameterError(f"the distribution of '{name}', {kind}: {error}") from None
         return found
 
+    def replaced(self) -> dict[str, float]:
+        """Return the parameters that are drawn, at their medians."""
+        found = self._distributions()
+        return {
+            n: sum(d) / 2 if isinstance(d, tuple) else float(d.median()) for n, d in found.items()
+        }
+
     def does(self, study: Study) -> str:
         """Return what is varied, in words."""
         return f"diagrams of random {', '.join(self.distributions)}, {self.span}"

@@ -61,6 +61,10 @@ class LyapunovTask(Response):
         size = partial(check_size, shape, self.starts or 1, len(asked.model.states))
         asked.attempt((self.name, "grid"), size)
 
+    def replaced(self) -> dict[str, float]:
+        """Return the parameters of the grid."""
+        return {name: values[0] for name, values in self.grid.items()}
+
     def does(self, study: Study) -> str:
         """Return the grid in words."""
         return f"exponents of trajectories at {axes_text(self.grid)}"

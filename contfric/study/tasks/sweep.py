@@ -54,6 +54,10 @@ class SweepTask(SectionTask):
         asked.attempt((self.name, "parameter"), lambda: asked.model.index_of(self.parameter))
         asked.check_axis((self.name, "values"), self.parameter, self.values)
 
+    def replaced(self) -> dict[str, float]:
+        """Return the parameter of the sweep."""
+        return {self.parameter: self.values[0]}
+
     def does(self, study: Study) -> str:
         """Return the sweep in words."""
         low, high, count = self.values

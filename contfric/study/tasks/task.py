@@ -175,6 +175,10 @@ class Task(SchemaPart):
     def check(self, asked: StudyCheck) -> None:
         """Check what the schema cannot know; a mistake fails with its line."""
 
+    def replaced(self) -> dict[str, float]:
+        """Return the parameters whose value in the study is not used, each with one that is."""
+        return {}
+
     def does(self, study: Study) -> str:
         """Return what the step does, in words."""
         raise NotImplementedError
