@@ -1,22 +1,16 @@
 """Orbits that are born where a bridge folds: sequences of both arms of its passages.
 
 If passages fold by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
-a candidate, over as many periods as at a sliding event. Otherwise the effect of a hold of a symmetric bridge
-may be stationary in its length. Then each of the two symmetric holds may become shorter or longer, so that
-a bridge with one shorter and one longer hold passes the same solution, and folds there as well.
+a candidate, over as many periods as at a sliding event: one of the two holds of a symmetric bridge may be the
+shorter one, and the other one the longer.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
-
-import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for
-from contfric.atlas.lines import ways_in_plane
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events import Decision, EndReason, Kind
@@ -25,32 +19,8 @@ from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, neck
 from contfric.continuation.side import first_point
 from contfric.continuation.switching import NEARER, start_beside
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertices import symmetrised
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-
-#: An orbit this much (of its distance from a symmetric one) off its own symmetry image is asymmetric.
-_ODD = 0.1
-
-
-def follow_fold(state: Exploration, event: Event) -> None:
-    """Try the families that pass a bridge where it turns."""
-    orbit = event.bifurcation.orbit
-    if follow_arms(state, event) or len(orbit.as_whole().system.holds) < 2:
-        return
-    half = orbit if orbit.system.half else symmetrised(orbit)
-    if half is None:
-        return
-    _try_crossing(
-        state, event, half.as_whole(), "the asymmetric branch with one hold of either length"
-    )
-    if not any(state.branches[i].system.half for i in event.branches):
-        _try_crossing(state, event, half, "the symmetric branch through the fold")
-
-
-# ---------------------------------------------------------------- passages that turn by themselves
 
 
 def follow_arms(state: Exploration, event: Event) -> bool:
@@ -121,52 +91,6 @@ def _reason(arms: Arms, sequence: tuple[int, ...]) -> str:
     bits = range(len(arms.turning))
     text = " ".join("".join("+-"[letter >> k & 1] for k in bits) for letter in sequence)
     return f"holds longer (+) or shorter (-) one after the other: {text}"
-
-
-# -------------------------------------------------------------------------- symmetric holds
-
-
-def _try_crossing(state: Exploration, event: Event, orbit: Orbit, reason: str) -> None:
-    settings = settings_for(orbit, state.settings)
-    active = orbit.model.index_of(settings.parameter)
-    for distance in NEARER:
-        for direction in _ways_through(orbit, active):
-            moved = replace(orbit, joints=orbit.joints + distance * direction)
-            point = first_point(moved, settings, direction, 0.0)
-            if point is None:
-                continue
-            there = point.orbit(orbit, active)
-            off = there.mirror_distance > _ODD * distance
-            if not there.admissible or off is orbit.system.half:
-                continue
-            if state.knows(event, reason, there):
-                return
-            _add_crossing(state, event, orbit, point, reason)
-            return
-
-
-def _ways_through(orbit: Orbit, active: int) -> list[FloatArray]:
-    """Return directions to look for a family in: where it is the only one of its equations, along it."""
-    found = [away for away, _ in ways_in_plane(orbit, active)]
-    if found or not orbit.system.half:
-        return found
-    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    return [vector / np.abs(vector).max() for vector in vectors]
-
-
-def _add_crossing(
-    state: Exploration, event: Event, orbit: Orbit, point: Point, reason: str
-) -> None:
-    """Trace a family that crosses a fold: both ways, or to one side of it where the other is its image."""
-    if not orbit.system.half:
-        _add_one_sided(state, event, orbit, point, reason)
-        return
-    active = orbit.model.index_of(state.settings.parameter)
-    branch = whole_branch(point.orbit(orbit, active), state.settings)
-    if branch is None:
-        state.judge(event, reason, Decision.REFUSED, why=EndReason.CONTINUUM.value)
-    else:
-        state.accept(event, reason, branch)
 
 
 def _add_one_sided(

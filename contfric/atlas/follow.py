@@ -18,7 +18,7 @@ from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
 from contfric.atlas.faults import fault_of, fault_of_itinerary
-from contfric.atlas.folds import follow_arms, follow_fold
+from contfric.atlas.folds import follow_arms
 from contfric.atlas.leaving_event import (
     from_admissible,
     leave_event,
@@ -78,7 +78,7 @@ def follow(state: Exploration, event: Event) -> None:
         if not follow_arms(state, event):
             _follow_doubling(state, event)
     elif kind is Kind.SN:
-        follow_fold(state, event)
+        follow_arms(state, event)
 
 
 # -------------------------------------------------------------------------- sliding events

@@ -22,7 +22,6 @@ from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import null_space
 from contfric.orbit.orbit import Orbit
 
 #: First step away from an event, in largest steps: the new itinerary is proved close to it. Where the
@@ -212,8 +211,7 @@ def leave_singular(
     if branch is not None:
         return branch
     active = orbit.model.index_of(settings.parameter)
-    lines = ((away, 0.0) for away in _line_of(orbit, active, settings))
-    for away, slope in chain(ways_in_plane(orbit, active), lines):
+    for away, slope in ways_in_plane(orbit, active):
         branch = _leave_beside(state, orbit, _straight(away), event, settings, slope)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
@@ -229,18 +227,6 @@ def _leave_together(
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
-
-
-def _line_of(orbit: Orbit, active: int, settings: Settings) -> Iterator[FloatArray]:
-    """Yield both directions of the one null vector where no first point is found at the event itself."""
-    vectors, _ = null_space(orbit.system, orbit.joints, orbit.vector, active)
-    if len(vectors) != 1 or any(
-        first_point(orbit, settings, *way) is not None for way in directions(orbit, active)
-    ):
-        return
-    away = vectors[0] / np.abs(vectors[0]).max()
-    yield away
-    yield -away
 
 
 def _trace(
