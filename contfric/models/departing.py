@@ -79,7 +79,7 @@ def other_departures(
     for on, domain in itertools.product(dict.fromkeys(on for on, _ in slides), domains):
         signs = {**domain.signs, on: 0}
         key, pair = tuple(signs.values()), pair_at(on, signs)
-        if key in beside or key in more or len(pair) < 2 or (on, pair) in sliding:
+        if key in beside or key in more or len({*pair.values()}) < 2 or (on, pair) in sliding:
             continue
         side = departing_side(sampler, pair, on, signs)
         first = next((d for d in found if _holds(d, signs)), None)
