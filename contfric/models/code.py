@@ -182,4 +182,5 @@ def _places(
         if SLOPES in sections or len(sections) > 1
         else next(iter(sections))
         for symbol, sections in users.items()
+        if sections  # sympy.cse may name what nothing uses
     }

@@ -51,6 +51,43 @@ def departing_side(
     return next(iter(verdicts)) if len(verdicts) == 1 else 0
 
 
+def other_departures(
+    sampler: Sampler,
+    domains: Sequence[Domain],
+    beside: Mapping[tuple[int, ...], str],
+    found: Sequence[Departure],
+) -> tuple[Departure, ...]:
+    """Return how a surface is passed between modes that do not slide there, though others do.
+
+    Sliding between one mode above a surface and one below it has limits; between two other modes, behind a
+    surface that divides a side, on which side of these limits a state is does not matter. There the fields
+    tell, where departures that are found say something else.
+
+    Parameters
+    ----------
+    beside : the mode of each combination of sides
+    found : departures beyond the limits of sliding
+    """
+    slides = [(on, d) for d in domains for on, side in d.signs.items() if side == 0]
+
+    def pair_at(on: str, signs: Mapping[str, int]) -> dict[int, str]:
+        keys = {side: tuple({**signs, on: side}.values()) for side in (1, -1)}
+        return {side: beside[key] for side, key in keys.items() if key in beside}
+
+    sliding = [(on, pair_at(on, domain.signs)) for on, domain in slides]
+    more: dict[tuple[int, ...], Departure] = {}
+    for on, domain in itertools.product(dict.fromkeys(on for on, _ in slides), domains):
+        signs = {**domain.signs, on: 0}
+        key, pair = tuple(signs.values()), pair_at(on, signs)
+        if key in beside or key in more or len({*pair.values()}) < 2 or (on, pair) in sliding:
+            continue
+        side = departing_side(sampler, pair, on, signs)
+        first = next((d for d in found if _holds(d, signs)), None)
+        if side and (first is None or first.leaves != {on: side}):
+            more[key] = Departure(signs, {on: side})
+    return tuple(more.values())
+
+
 def limit_departures(
     sampler: Sampler,
     surfaces: list[Surface],

@@ -25,7 +25,13 @@ from contfric.models.definition import (
     Surface,
     Symmetry,
 )
-from contfric.models.departing import departing_side, leaves_at_rest, limit_departures, turned_modes
+from contfric.models.departing import (
+    departing_side,
+    leaves_at_rest,
+    limit_departures,
+    other_departures,
+    turned_modes,
+)
 from contfric.models.description import Description, Range
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
@@ -251,6 +257,7 @@ def _departures(
             if departure is not None:
                 found[key] = departure
     others = tuple(found.values())
+    others = (*other_departures(sampler, domains, beside, others), *others)
     return (*limit_departures(sampler, surfaces, domains, others), *others)
 
 

@@ -19,7 +19,7 @@ from contfric.models.check.probe import Probe
 from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
-from contfric.orbit.starts import signs_at
+from contfric.orbit.starts import left_through
 from contfric.orbit.time_scale import clock_period
 
 #: Longest period that is looked for, in periods of the excitation.
@@ -164,24 +164,28 @@ def _parting(trajectory: Trajectory) -> str:
 
 def goes_on(trajectory: Trajectory) -> str:
     """Return what a solution does that meets nothing any more; nothing if it has come to an equilibrium."""
-    model, (_, time, state, mode) = trajectory.model, trajectory.last
-    vector = model.vector(trajectory.params)
-    whole, signs = model.whole_mode(mode), signs_at(model, time, state, vector)
-    for surface, side in signs.items():
-        if surface in model.settled_sides:  # at rest on a wall it is on either side
-            continue
-        sides = {d.signs.get(surface, 0) for d in model.domains_of(whole)}
-        if side and sides == {-side}:
-            return (
-                f"the solution has left the region of '{mode}' at '{surface}', where no mode follows. "
-                "`contfric check` says what is missing"
-            )
+    if left := left_region(trajectory):
+        return left
+    mode = trajectory.last[3]
     if not moves_on(trajectory):
         return ""
     return (
         f"the solution stays in '{mode}' and meets no surface any more. A cycle inside of one mode is found "
         "at a section: give the model a surface that it crosses, with two modes of the same field on its "
         "sides"
+    )
+
+
+def left_region(trajectory: Trajectory) -> str:
+    """Return where a solution has left the region of its mode, as no mode follows; nothing if it has not."""
+    model, (_, time, state, mode) = trajectory.model, trajectory.last
+    vector = model.vector(trajectory.params)
+    surface = mode and left_through(model, mode, time, state, vector)
+    if not surface:
+        return ""
+    return (
+        f"the solution has left the region of '{mode}' at '{surface}', where no mode follows. "
+        "`contfric check` says what is missing"
     )
 
 

@@ -17,6 +17,7 @@ from contfric.orbit.aperiodic import (
     affordable,
     goes_on,
     goes_round,
+    left_region,
     moves_on,
     out_of_range,
     why_none,
@@ -248,7 +249,8 @@ def _walls_met(trajectory: Trajectory) -> list[str]:
 
 
 def _check_motion(trajectory: Trajectory) -> None:
-    if trajectory.end is SimulationEnd.QUIET and (why := goes_on(trajectory)):
+    looks = {SimulationEnd.QUIET: goes_on, SimulationEnd.IMPOSSIBLE: left_region}
+    if trajectory.end in looks and (why := looks[trajectory.end](trajectory)):
         raise ConvergenceError(f"no periodic orbit: {why}", trajectory)
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         why, mode = trajectory.end.value, trajectory.last[3]

@@ -22,7 +22,7 @@ from contfric.models.structure_model import ComposedModel
 from contfric.models.tied import tied
 from contfric.orbit.dense import sample, table
 from contfric.orbit.pace import Pace
-from contfric.orbit.starts import checked_state, start_of
+from contfric.orbit.starts import checked_state, left_through, start_of
 from contfric.orbit.system import IntArray
 from contfric.orbit.tables import SOLVED, surfaces_under, tables
 from contfric.orbit.time_scale import clock_period, time_scale
@@ -282,6 +282,12 @@ def run(
     modes, exits = found.joints.T
     columns = modes, exits, found.cycles, found.times, found.states
     how, params = list(SimulationEnd)[end], model.mapping(vector)
+    if (
+        how is SimulationEnd.TIME
+        and growing is None
+        and left_through(model, at_last[3], *at_last[1:3], vector)
+    ):
+        how = SimulationEnd.IMPOSSIBLE  # it has passed a surface at which no mode follows
     return Trajectory(model, params, *columns, how, at_last, began_at)
 
 

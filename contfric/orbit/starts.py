@@ -27,6 +27,8 @@ _DRAWN = 3
 #: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
 #: nobody may have written, and then further out.
 _DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
+#: A state this far behind a surface, relative to 1 + the states, is not on it by rounding.
+_OUTSIDE = 1e-6
 #: Surfaces that an error names: more are no line to read.
 _SURFACES_SHOWN = 8
 
@@ -40,6 +42,18 @@ def signs_at(
         apart = flow.height(surface.name, t, y)
         signs[surface.name] = 0 if abs(apart) <= within else int(np.sign(apart))
     return {**signs, **model.settled_sides}
+
+
+def left_through(model: Model, mode: str, t: float, y: FloatArray, vector: FloatArray) -> str:
+    """Return the surface through which a solution has left the region of its mode; nothing if it has not."""
+    within = _OUTSIDE * (1.0 + float(np.max(np.abs(y))))
+    own = model.domains_of(model.whole_mode(mode))
+    for surface, side in signs_at(model, t, y, vector, within).items():
+        if surface in model.settled_sides:  # at rest on a wall it is on either side
+            continue
+        if side and {d.signs.get(surface, 0) for d in own} == {-side}:
+            return surface
+    return ""
 
 
 def start_of(
