@@ -9,7 +9,8 @@ equations of the branch exactly; not only up to the width of balls.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from flint import arb, arb_mat
 
@@ -40,6 +41,15 @@ class _Cycle:
     turn: arb
     periods: int
 
+    def dated(self, autonomous: bool, first: arb) -> Iterator[_Cycle]:
+        """Yield the cycle; without excitation, with each of its joints in turn at a branch's first time."""
+        if not autonomous:
+            yield self
+            return
+        for own in self.joints:
+            later = (first - own[0]).mid()
+            yield replace(self, joints=[[z[0] + later, *z[1:]] for z in self.joints])
+
 
 def as_zero_of(
     proof: EventCertificate, system: System, segments: Segments, build: Builder, near: Vector
@@ -51,7 +61,7 @@ def as_zero_of(
     build : the model with the phase for its time
     near : approximate solution of the chain at the event
     """
-    if proof.location is None or proof.value is None or system.model.autonomous:
+    if proof.location is None or proof.value is None:
         return None
     own = proof.location.orbit.system
     if own.model is not system.model or (system.half and not own.half):
@@ -63,9 +73,10 @@ def as_zero_of(
     model = build(proof.value)
     for touched in (False, True)[: 1 + _is_within(proof)]:
         cycle = _cycle(proof, model, touched)
-        found = None if cycle is None else _on(cycle, system, segments, model, near)
-        if found is not None:
-            return [*found, proof.value]
+        for dated in [] if cycle is None else cycle.dated(system.model.autonomous, near[0]):
+            found = _on(dated, system, segments, model, near)
+            if found is not None:
+                return [*found, proof.value]
     return None
 
 
@@ -87,10 +98,14 @@ def _on(
         if at is None:
             return None
         found.append(at)
-    found.append(_closed(found[0], cycle, system))
+    found.append(_closed(found[0], cycle, system, near))
     if not all(_leads(cycle, model, segments, i, *found[i : i + 2]) for i in range(count)):
         return None
-    return [c for at in found[:-1] for c in _moved(cycle, at)]
+    *joints, closed = (_moved(cycle, at) for at in found)
+    end = (
+        closed[0] if system.model.autonomous else arb(0)
+    )  # without excitation a cycle ends at time 0
+    return [c for time, *state in joints for c in (time - end, *state)]
 
 
 def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> _Cycle | None:
@@ -105,9 +120,9 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     twice = closure * closure == one  # for certain
     if not twice:
         return None
-    two_pi = 2 * arb.pi()
+    autonomous = event.orbit.model.autonomous
     timed = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)
-    scale = two_pi / timed.period
+    scale = arb(1) if autonomous else 2 * arb.pi() / timed.period
     joints = [list(proof.zero[i * m : (i + 1) * m]) for i in range(segments.count)]
     joints = [[joint[0] * scale, *joint[1:]] for joint in joints]
     condition = location.condition
@@ -136,7 +151,7 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
         known.insert(i + 1, [row, rate, *kept])
         modes.insert(i + 1, mode)
         resets.insert(i + 1, "")
-    turn = arb(segments.turn) * two_pi
+    turn = -joints[0][0] if autonomous else arb(segments.turn) * 2 * arb.pi()
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
         joints, known = (
@@ -167,11 +182,14 @@ def _moved(cycle: _Cycle, at: tuple[int, int]) -> Vector:
     return [joint[0] + at[1] * cycle.turn, *joint[1:]]
 
 
-def _closed(first: tuple[int, int], cycle: _Cycle, system: System) -> tuple[int, int]:
+def _closed(first: tuple[int, int], cycle: _Cycle, system: System, near: Vector) -> tuple[int, int]:
     """Return the joint that the closure of the branch leads to from its first one."""
     j, later = first
     if not system.half:
-        return j, later + system.periods // cycle.periods
+        times = system.periods // cycle.periods
+        if system.model.autonomous:
+            times = round(float((-near[0] / cycle.turn).mid()))
+        return j, later + times
     count = len(cycle.joints)
     steps = j + count // 2
     return steps % count, later + steps // count

@@ -193,6 +193,7 @@ def in_phases(model: BallModel) -> BallModel:
         slopes,
         model.alike,
         unscaled=model.fields,
+        kept=model.kept,
     )
 
 

@@ -84,9 +84,8 @@ def _at_end(
     segments: Segments, model: BallModel, i: int, found: list[list[Vector]]
 ) -> list[Vector]:
     """Return the rows that vanish at the end of a segment: its exit, and what it keeps at zero."""
-    field = model.fields[segments.modes[i]]
     known = at_start(segments, model, i, found[i])
-    kept = [row for row in known if _is_zero(numbers(arb_mat([row]) * field))]
+    kept = [row for row in known if model.keeps(row, segments.modes[i])]
     if not segments.exits[i]:
         return kept
     exit_row = model.rows[segments.exits[i]]

@@ -47,3 +47,29 @@ def test_slips_that_come_in_and_go_are_joined(tmp_path: Path, seed: int) -> None
         there = cf.find_orbit(model, params | {"w": float(value)})
         beside = [b for b in found.branches if b.values.min() <= value <= b.values.max()]
         assert there.system.segments in [b.system.segments for b in beside]
+
+
+ASYMMETRIC = """
+name: one_sided
+states: [x, v]
+parameters: {W: 0.45, S: 0.22, c: 0.08}
+period: 2*pi/W
+surfaces: {stop: {observable: v, sliding: filippov}}
+field: {x: v, v: cos(W*t) + c - x - S*sign(v)}
+modes: {forward: {in: {stop: +}}, backward: {in: {stop: -}}}
+spread: {x: 2, v: 1}
+"""
+
+
+@pytest.mark.parametrize(("omega", "s", "c"), [(0.483, 0.205, 0.07), (0.45, 0.22, 0.08)])
+def test_where_a_slide_without_length_lies_between_a_hold_and_a_rest(
+    omega: float, s: float, c: float, tmp_path: Path
+) -> None:
+    """Without symmetry a touch is alone; no surface parts the rest after it."""
+    path = tmp_path / "one_sided.yaml"
+    path.write_text(ASYMMETRIC)
+    orbit = cf.find_orbit(path, {"W": omega, "S": s, "c": c})
+    diagram = cf.explore(orbit, "W", (0.85 * omega, 1.15 * omega), max_branches=4)
+    assert len(diagram.branches) > 1
+    for branch in diagram.branches:
+        assert branch[len(branch) // 2].certify().admissible.proved

@@ -150,6 +150,35 @@ def test_orbits_with_contacts_that_never_slip_are_proved_among_those_that_keep_t
     assert not replace(orbit, joints=joints).certify().proved
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_structures_whose_contacts_share_loads_are_proved(seed: int) -> None:
+    """Their modes are made when a solution first visits them, and so are the limits of shared loads."""
+    rng = np.random.default_rng(seed)
+    limits = {"low": ("v1", *rng.uniform((0.1, 0.35), (0.3, 0.6)))}
+    limits["high"] = ("v2 - v1", *rng.uniform((0.05, 0.2), (0.2, 0.3)))
+    contacts = {
+        name: {"kind": "friction", "velocity": velocity, "kinetic": str(s), "static": str(s0)}
+        for name, (velocity, s, s0) in limits.items()
+    }
+    model = cf.Mechanism(
+        np.diag(rng.uniform(0.7, 1.5, 2)),
+        rng.uniform(0.3, 0.6) * np.eye(2),
+        np.array([[2.0, -1.0], [-1.0, 2.0]]),
+        contacts=contacts,
+        force={"q1": "cos(W*t)", "q2": "0.3*sin(W*t) + 0.1"},
+        parameters={"W": float(rng.uniform(0.4, 1.2))},
+        period="2*pi/W",
+        name=f"shared-{seed}",
+    )
+    assert model.composed
+    orbit = cf.find_orbit(model)
+    assert len(set(orbit.system.layout.modes)) > 1
+    assert orbit.certify().proved, orbit.certify().why
+    joints = orbit.joints.copy()
+    joints[0, 1] += 1e-3
+    assert not replace(orbit, joints=joints).certify().proved
+
+
 # ---------------------------------------------------------------------------------- signs
 
 

@@ -18,7 +18,7 @@ from contfric.certify.tube import Box, box_between, solved
 from contfric.continuation.events import EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.solve import refine
 
 SCENE = {"Omega": 0.55, "S": 0.32, "S0": 0.4}
@@ -332,3 +332,20 @@ def test_a_branch_is_covered_towards_an_end_that_is_not_found(
         assert gap.stop - gap.start < 1e-3 * step
     proved = [piece for piece in found.pieces if piece.proved]
     assert all(piece.linked for piece in proved[1:])
+
+
+def test_events_of_branches_without_excitation_solve_their_equations() -> None:
+    """Such a cycle has no phase: that of the event is moved to the times of the branch, which ends at 0."""
+    diagram = cf.explore(cf.find_orbit("relay-sliding"), "lam", (0.05, 0.06), max_branches=1)
+    branch = diagram.branches[0]
+    folds = [event for event in branch.bifurcations if event.kind.value == "SN"]
+    assert folds
+    with working(128):
+        strand = Strand(branch)
+        found = strand.met_by([fold.certify("lam") for fold in folds])
+        assert [label for label, _, _ in found] == [fold.label for fold in folds]
+        for (_, zero, _), fold in zip(found, folds, strict=True):
+            chain = Chain(strand.segments, strand.plain(zero[-1]))
+            assert all(x.contains(0) and x.rad() < 1e-25 for x in chain.residual(zero[:-1]))
+            off = [float(x) - y for x, y in zip(zero, fold.orbit.joints.ravel(), strict=False)]
+            assert np.abs(off).max() < 1e-6

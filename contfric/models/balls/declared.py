@@ -10,7 +10,7 @@ Numbers in formulas are taken as they are stored: a decimal of a model's file is
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -23,6 +23,9 @@ from contfric.models.balls.model import BallModel, Closure, Pairs, SignedPairs
 from contfric.models.balls.numbers import zeros
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
+from contfric.models.description import Description
+from contfric.models.parts import Observable
+from contfric.models.structure_modes import composition_of
 from contfric.models.symbols import Formulas
 
 
@@ -37,6 +40,7 @@ class AffineModel:
     fields, surfaces, resets : rows of the extended state, in symbols
     period : in symbols; 0 without excitation
     turns : how often each frequency turns in a period
+    kept : surfaces and modes of a structure that move on them by :func:`_keeping`
     """
 
     states: int
@@ -47,6 +51,7 @@ class AffineModel:
     resets: dict[str, list[list[Any]]]
     period: Any
     turns: tuple[int, ...]
+    kept: frozenset[tuple[str, str]] = frozenset()
 
 
 def declared_balls(model: Model, params: Mapping[str, arb], free: str | None = None) -> BallModel:
@@ -62,7 +67,8 @@ def declared_balls(model: Model, params: Mapping[str, arb], free: str | None = N
     if model.integrated:
         named = "; ".join(f"mode {mode}: {why}" for mode, why in model.integrated.items())
         raise not_offered(model.name, f"it is integrated numerically ({named})")
-    affine = affine_model(model.definition)
+    modes = tuple(mode.name for mode in model.modes) if model.composed else ()
+    affine = affine_model(model.definition, modes, tuple(model.surface_by_name) if modes else ())
     values = {affine.parameters[name]: ball for name, ball in params.items()}
     try:
         if free is None:
@@ -83,8 +89,14 @@ def not_offered(name: str, why: str) -> ParameterError:
 
 
 @lru_cache(maxsize=32)
-def affine_model(definition: str) -> AffineModel:
+def affine_model(
+    definition: str, visited: tuple[str, ...] = (), seen: tuple[str, ...] = ()
+) -> AffineModel:
     """Return a declared model in symbols.
+
+    Parameters
+    ----------
+    visited, seen : modes and surfaces of a structure whose modes are made when they are visited
 
     Raises
     ------
@@ -92,6 +104,8 @@ def affine_model(definition: str) -> AffineModel:
         If it is not affine: the message names what is not.
     """
     description = from_text(definition)
+    if visited:
+        description = _written_out(definition, visited, seen)
     formulas, name = Formulas(description), description.name
     if description.kinks:
         raise not_offered(name, f"its fields have kinks ({', '.join(description.kinks)})")
@@ -117,8 +131,59 @@ def affine_model(definition: str) -> AffineModel:
     def rows(group: Mapping[str, Sequence[AffineForm]]) -> dict[str, list[list[Any]]]:
         return {key: [_row(form, n, frequencies) for form in forms] for key, forms in group.items()}
 
+    moves, heights_of, kept = rows(fields), rows(surfaces), list[tuple[str, str]]()
+    for mode in description.modes if visited else ():
+        on = [name for name, side in mode.sides.items() if side == 0]
+        kept += [(name, mode.name) for name in on]
+        on_rows = [heights_of[name][0] for name in on]
+        moves[mode.name] = _keeping(on_rows, moves[mode.name], frequencies)
     return AffineModel(
-        n, symbols, frequencies, rows(fields), rows(surfaces), rows(resets), period, turns
+        n, symbols, frequencies, moves, heights_of, rows(resets), period, turns, frozenset(kept)
+    )
+
+
+def _keeping(kept: list[list[Any]], rows: list[list[Any]], frequencies: Sequence[Any]) -> list[Any]:
+    """Return the rows of a field that keeps some surfaces exactly.
+
+    A structure's formulas have the inverse of its mass matrix as it was rounded: a contact would not rest by
+    them, but leave with 1e-17. Its rows are solved for as many states as there are surfaces.
+    """
+    n, found = len(rows), list(rows)
+    if not kept:
+        return found
+    rates = [[*row[:n], *_moved(row, n, frequencies)] for row in kept]
+    reduced, pivots = sympy.Matrix(rates).rref()
+    for r, pivot in enumerate(pivots):
+        others = [j for j in range(n) if j not in pivots]
+        found[pivot] = [
+            -reduced[r, n + c] - sum(reduced[r, j] * rows[j][c] for j in others)
+            for c in range(len(rows[0]))
+        ]
+    return found
+
+
+def _moved(row: list[Any], n: int, frequencies: Sequence[Any]) -> list[Any]:
+    """Return the rate of an observable with the states held fixed."""
+    rate = [sympy.Integer(0)] * len(row)
+    for k, w in enumerate(frequencies):
+        at = n + 1 + 2 * k
+        rate[at], rate[at + 1] = w * row[at + 1], -w * row[at]
+    return rate
+
+
+def _written_out(definition: str, modes: Sequence[str], surfaces: Sequence[str]) -> Description:
+    """Return a structure with some of its modes, and the limits of shared loads that they come to."""
+    composition, description = composition_of(definition), from_text(definition)
+    loads = {name: text for mode in modes for name, text in composition.loads_in(mode).items()}
+    limits = [composition.surface(name) for name in surfaces if name not in composition.declared]
+    seen = {o.name: o for o in description.observables}
+    seen |= {limit.observable: Observable(limit.observable, text) for limit, text in limits}
+    return replace(
+        description,
+        define=(*description.define, *loads.items()),
+        observables=tuple(seen.values()),
+        surfaces=(*description.surfaces, *(limit for limit, _ in limits)),
+        modes=tuple(map(composition.text, modes)),
     )
 
 
@@ -126,11 +191,8 @@ def affine_model(definition: str) -> AffineModel:
 def alike(affine: AffineModel, surface: str, mode: str) -> str | None:
     """Return the surface whose row is the rate of another one along a mode, or its negative, in symbols."""
     n, (row,), field = affine.states, affine.surfaces[surface], affine.fields[mode]
-    rate = [sum(row[i] * field[i][j] for i in range(n)) for j in range(len(row))]
-    for k, w in enumerate(affine.frequencies):
-        at = n + 1 + 2 * k
-        rate[at] += w * row[at + 1]
-        rate[at + 1] -= w * row[at]
+    still = _moved(row, n, affine.frequencies)
+    rate = [sum(row[i] * field[i][j] for i in range(n)) + c for j, c in enumerate(still)]
     for name, (other,) in affine.surfaces.items():
         pairs = list(zip(rate, other, strict=True))
         if any(all(sympy.expand(a + sign * b) == 0 for a, b in pairs) for sign in (1, -1)):
@@ -253,6 +315,7 @@ def _evaluated(
         slopes,
         partial(alike, affine) if one else None,
         partial(mirrored, affine) if one else None,
+        kept=affine.kept if one else frozenset(),
     )
 
 

@@ -59,6 +59,8 @@ class BallModel:
         parameters: of a closure, of pairs of modes, and of pairs of surfaces with their signs.
     unscaled : dict
         Fields that are these but for a positive factor of the states, and without its rounding; if there are.
+    kept : frozenset
+        Surfaces and modes that move on them, of which balls of the fields do not show it.
     """
 
     states: int
@@ -72,6 +74,13 @@ class BallModel:
     alike: Callable[[str, str], str | None] | None = None
     mirrored: Callable[[Closure, Pairs, SignedPairs], bool] | None = None
     unscaled: dict[str, arb_mat] = field(default_factory=dict)
+    kept: frozenset[tuple[str, str]] = frozenset()
+
+    def keeps(self, row: Vector, mode: str) -> bool:
+        """Tell whether the rate of an observable vanishes along a mode, exactly."""
+        if any(row is self.rows[name] for name, at in self.kept if at == mode):
+            return True
+        return all(x.is_zero() for x in numbers(arb_mat([row]) * self.fields[mode]))
 
     @cached_property
     def rows(self) -> dict[str, Vector]:
