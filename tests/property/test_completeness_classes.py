@@ -574,3 +574,16 @@ def test_a_slide_that_nearly_stands_before_it_is_held_begins_where_it_begins(
     orbit = cf.find_orbit("coulomb", params, longest=1000)
     explored = cf.explore(orbit, found.vary, found.range)
     assert len(explored.branches) >= 5 and explored.verify().passed
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_an_event_at_which_the_pin_of_a_hold_moves_has_one_name(case: int) -> None:
+    """A hold touches its limit on its way, or a slide stops tangentially: which depends on the branch."""
+    found, random = restarts.scene(56, 3), np.random.default_rng([3, case])
+    params = dict(found.params)
+    for name in ("S", "S0", "h") if case else ():
+        params[name] *= random.uniform(0.97, 1.03)
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    explored = cf.explore(orbit, found.vary, (0.0, 0.05))
+    assert len(explored.branches) >= 7
+    assert explored.verify(restarts=3).passed
