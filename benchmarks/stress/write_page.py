@@ -47,10 +47,10 @@ to each other than 1e-7 of the range. In case 36 of seed 36 branches of three pe
 of six holds turn: some are said to end there, and one half of another is counted twice.
 
 **What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
-failures: all cases with S = S0, or with Omega = 1/n and no damping; two events at one point with the same
-solution; and smooth events at which a second condition fails (`contfric/atlas/degenerate.py`). Cases that
-take longer than a limit are cut (in runs that name no commit those with too many branches, too). The tables
-show how many there are.
+failures: all cases with S = S0, or with Omega = 1/n and no damping; two events of one solution that are
+nearer than their accuracies; and smooth events at which a second condition fails
+(`contfric/atlas/degenerate.py`). Cases that take longer than a limit are cut (in runs that name no commit
+those with too many branches, too). The tables show how many there are.
 
 **To repeat.** `make stress` repeats everything. One run, and the page:
 

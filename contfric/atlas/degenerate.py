@@ -16,7 +16,7 @@ import numpy as np
 from contfric.atlas.matching import stops_distance
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.events import Bifurcation, Kind
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
@@ -41,8 +41,7 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     )
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
-        known = max(ACCURACY, a.accuracy + b.accuracy) * width
-        if gap <= known and _alike(a, b):
+        if gap <= (a.accuracy + b.accuracy) * width and _alike(a, b):
             yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
     for branch in diagram.branches:
         if not branch.mirrored and unresolved(branch, width):

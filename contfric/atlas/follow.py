@@ -100,11 +100,11 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     # what local conditions exclude, and these are not asked of many contacts
     once = composes(orbit) and event.bifurcation.accuracy > ACCURACY
     tried: set[tuple[object, ...]] = set()  # by what an orbit is solved from: it ends the same
+    itineraries: set[Itinerary] = set()
     for candidate in partial_touches(event.bifurcation, active, state.max_periods, state.copies):
         _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
         incident = incident_forms(event.bifurcation, wide)
-        itineraries: set[Itinerary] = set()
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)

@@ -43,8 +43,6 @@ from contfric.orbit.orbit import Orbit
 _BEND, _NEARER, _MISSED = LEAVE, 0.25, 0.2
 #: Data that an orbit keeps (where contacts rest that never slip) and that differ by more are different ones.
 _KEPT = 1e-11
-#: How near a bridge begins that may begin there, in such distances.
-_AT_ONCE = 0.1
 
 
 def nearest(orbit: Orbit) -> float:
@@ -172,13 +170,13 @@ def _known(state: Exploration, branch: Branch) -> int | None:
 def begins_at_short(state: Exploration, event: Event) -> None:
     """Let a bridge begin where a short branch ends, if it was taken to begin at the event just after that.
 
-    What is held there is negative between both, by the square of their distance: rounding. So it is found
-    from either of them, and belongs to the one that comes first.
+    What is held there is negative between both, by the square of their distance: less than is seen as
+    violated. So it is found from either of them, and belongs to the one that comes first.
     """
     if len(event.branches) != 1 or not is_short(state.branches[event.branches[0]]):
         return
     b, width = event.bifurcation, state.settings.width
-    near = _AT_ONCE * nearest(b.orbit)
+    near = nearest(b.orbit)
     for index, branch in enumerate(state.branches):
         system = branch.system
         if not system.holds or system.half or system.periods != b.orbit.as_whole().periods:

@@ -79,7 +79,7 @@ def sliding_events(
         point.lost = bool(abs(point.tests[first]) >= ROUGHLY_REACHED)
     vanished = _vanished_stick(here, kind, orbit.system.tests[first])
     if vanished is not None:
-        point.lost = False
+        point.lost, point.rough = False, rough or left > 0.0
         return [(bifurcation_at(Kind.CS, here, before, None, point, settings, (vanished,)), point)]
     group = tuple(
         test

@@ -55,16 +55,25 @@ def slides_of(orbit: Orbit) -> list[int]:
     cut = [i for i in some if orbit.itinerary[i - 1] in orbit.model.sections]
     if cut:  # the only joints that are in every itinerary; of touches any may be an impact or not
         return some if len(cut) < len(some) and only_touches(orbit) else cut
-    found = []
-    for k, i in enumerate(some):
-        before, mode = some[k - 1], orbit.itinerary[i][0]
-        gap = np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])
-        goes_on = (
-            orbit.itinerary[before][0] == mode and np.max(gap) < SAME_SOLUTION and len(some) > 1
-        )
-        if mode not in sliding and not goes_on and not stands_still(orbit, i):
-            found.append(i)
-    return found or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]
+    goes_on = [_goes_on(orbit, some[k - 1], i) for k, i in enumerate(some)]
+    found = set()
+    for k, i in enumerate(some if not all(goes_on) else ()):
+        if orbit.itinerary[i][0] in sliding or stands_still(orbit, i):
+            continue
+        first = k
+        while goes_on[
+            first
+        ]:  # what it goes on from may stand still: in other itineraries that is a part of it
+            first -= 1
+        found.add(some[first])
+    return sorted(found) or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]
+
+
+def _goes_on(orbit: Orbit, before: int, i: int) -> bool:
+    """Tell whether a segment goes on in the mode and from the state in which another one ended."""
+    if i == before or orbit.itinerary[before][0] != orbit.itinerary[i][0]:
+        return False
+    return bool(np.max(np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])) < SAME_SOLUTION)
 
 
 def stands_still(orbit: Orbit, i: int) -> bool:

@@ -558,3 +558,32 @@ def test_where_a_firing_comes_in_the_sum_of_indices_jumps(tmp_path: Path) -> Non
     assert [b.kind.value for b in diagram.bifurcations] == ["GS"]  # below it the neuron fires twice
     found = diagram.verify()
     assert found.passed and [b.below for b in found.balances] == [None]
+
+
+@pytest.mark.parametrize("case", [None, 2, 1, 5])
+def test_a_slide_that_nearly_stands_before_it_is_held_begins_where_it_begins(
+    case: int | None,
+) -> None:
+    """Held at a touch or not, the solution at that event is one: its slide begins before the touch."""
+    found = restarts.scene(56, 142)
+    random = np.random.default_rng([142, case or 0])
+    params = dict(found.params)
+    if case is not None:
+        for name, within in (("S", 0.02), ("h", 0.01), ("S0", 0.02)):
+            params[name] *= random.uniform(1.0 - within, 1.0 + within)
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    explored = cf.explore(orbit, found.vary, found.range)
+    assert len(explored.branches) >= 5 and explored.verify().passed
+
+
+@pytest.mark.parametrize("case", range(3))
+def test_an_event_at_which_the_pin_of_a_hold_moves_has_one_name(case: int) -> None:
+    """A hold touches its limit on its way, or a slide stops tangentially: which depends on the branch."""
+    found, random = restarts.scene(56, 3), np.random.default_rng([3, case])
+    params = dict(found.params)
+    for name in ("S", "S0", "h") if case else ():
+        params[name] *= random.uniform(0.97, 1.03)
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    explored = cf.explore(orbit, found.vary, (0.0, 0.05))
+    assert len(explored.branches) >= 7
+    assert explored.verify(restarts=3).passed

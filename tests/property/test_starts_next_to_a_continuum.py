@@ -67,3 +67,19 @@ def test_from_every_branch(seed: int) -> None:
     for branch in diagram.branches:
         for step in () if branch.mirrored else (2.0, 1.0, STEP):
             assert compared(diagram, branch, step) == [], (branch.name, step)
+
+
+@pytest.mark.parametrize("case", [78, 93, *range(12)])
+def test_with_little_damping_sticks_get_short_and_do_not_vanish(case: int) -> None:
+    # a step that is longer than the stick goes over to orbits whose stick lasts less than no time
+    random = np.random.default_rng([188, case])
+    limit = random.uniform(0.05, 0.6)
+    friction, zeta = limit * random.uniform(0.3, 0.95), 10.0 ** random.uniform(-8.0, -3.0)
+    omega = float(random.choice([0.5, 0.25]))
+    params = {"Omega": omega, "S": friction, "S0": limit, "h": 0.0, "zeta": zeta}
+    orbit = cf.find_orbit("coulomb", params, longest=300)
+    branch = cf.continue_orbit(orbit, "Omega", (omega - 0.04, omega + 0.04))
+    vanished = [b for b in branch.bifurcations if b.kind is cf.Kind.CS]
+    for b in vanished:
+        left = [float(b.orbit.margins[b.orbit.system.tests.index(test)]) for test in b.tests]
+        assert max(map(abs, left)) < 1e-8
