@@ -19,6 +19,7 @@ from contfric.models.parts import Domain, FloatArray, Mode, Observable, Surface
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
+    from contfric.handle import Bound
     from contfric.models.coded_flow import CodedFlow
     from contfric.models.description import Description
     from contfric.models.structure_modes import Composition
@@ -336,6 +337,11 @@ class ComposedModel(Model):
     def flow(self) -> CompiledFlow:
         """The compiled flow of the modes that were visited; it grows with them."""
         return self._coded.flow
+
+    @property
+    def field(self) -> Bound:
+        """The compiled field of the modes that were visited; it grows with them, as the flow does."""
+        return self._coded.field
 
     def state_and_rate(
         self, mode: int, t: float, y: FloatArray, vector: FloatArray
