@@ -198,7 +198,9 @@ def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
     signs = signs_at(model, time, state, orbit.vector)
     own = [model.domain_by_name[name] for name in mode_domains(model, mode)]
 
-    def contradicted(domain: Domain) -> int:  # by the surfaces that bound it: a composed one has few
+    def contradicted(
+        domain: Domain,
+    ) -> int:  # by the surfaces that bound it: a composed one has few
         return sum(domain.signs.get(s, 0) * sign < 0 for s, sign in signs.items())
 
     return min(own, key=contradicted).own_mode
