@@ -10,6 +10,7 @@ import pytest
 import contfric as cf
 from contfric.errors import ModelError, ParameterError
 from contfric.models import structure as reading
+from contfric.models.check.probe import Probe
 from contfric.models.definition import FloatArray
 from contfric.signature.holds import comes_to_rest, ends_rest, left_surface
 
