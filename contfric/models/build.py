@@ -84,7 +84,7 @@ def field_of(model: Model) -> Any:
     that are made when they are visited have theirs in the flow that grows with them.
     """
     if isinstance(model, ComposedModel):
-        return model.field
+        return model.coded.field
     flow = model.flow_factory
     definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
     found = coded_flow(definition)
