@@ -237,9 +237,8 @@ def _without_slides(form: Form) -> tuple[Form, tuple[Parted, ...]]:
             continue
         held = is_hold(first) and last == TOUCH
         if not held:
-            if is_hold(first) or not (
-                model.filippov and mode == then and ends_rest(model, mode, first)
-            ):
+            rests = model.filippov and mode == then and not (is_hold(first) or is_hold(last))
+            if not (rests and ends_rest(model, mode, first)):
                 continue
             itinerary[h] = mode, last
         # what parts the rest after the slide parts this one now; a hold is parted once

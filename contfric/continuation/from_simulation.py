@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.models.definition import Domain, FloatArray
 from contfric.orbit.clock import clocked
 from contfric.orbit.conserved import conserved
 from contfric.orbit.one_way import only_grows
@@ -201,4 +201,9 @@ def _declared(orbit: Orbit, i: int, time: float, state: FloatArray) -> str:
         return mode
     signs = signs_at(model, time, state, orbit.vector)
     own = [model.domain_by_name[name] for name in mode_domains(model, mode)]
-    return min(own, key=lambda d: sum(d.signs[s] * sign < 0 for s, sign in signs.items())).own_mode
+
+    def contradicted(domain: Domain) -> int:
+        """Return by how many of the surfaces that bound it; a composed one has few."""
+        return sum(domain.signs.get(s, 0) * sign < 0 for s, sign in signs.items())
+
+    return min(own, key=contradicted).own_mode

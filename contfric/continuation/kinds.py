@@ -89,7 +89,9 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     touched = touched_at_joint(test, orbit, resting)
     if touched is not None:
         return _kind_of_touch(model, mode, touched)
-    return Kind.CS if resting is None or _leaves(resting, test, orbit) else Kind.SS
+    if resting is None or not ends_rest(model, resting.mode, test.surface):
+        return Kind.CS  # such as by the velocity of another contact, which comes to rest with it
+    return Kind.CS if _leaves(resting, test, orbit) else Kind.SS
 
 
 def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:

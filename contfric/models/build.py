@@ -28,6 +28,7 @@ from contfric.base.sources import kernels_digest
 from contfric.errors import ResultFileError
 from contfric.models.coded import forms_of
 from contfric.models.coded_flow import coded_flow
+from contfric.models.structure_model import ComposedModel
 
 if TYPE_CHECKING:
     from contfric.compiled import Kernel
@@ -79,8 +80,11 @@ def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
 def field_of(model: Model) -> Any:
     """Return the compiled field of the modes of a model, without the flow, which takes longer.
 
-    It is that of the flow's own definition, without names and titles: another text is another module.
+    It is that of the flow's own definition, without names and titles: another text is another module. Modes
+    that are made when they are visited have theirs in the flow that grows with them.
     """
+    if isinstance(model, ComposedModel):
+        return model.coded.field
     flow = model.flow_factory
     definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
     found = coded_flow(definition)

@@ -108,8 +108,8 @@ class ComposedModel(Model):
     def _visit(self, name: str) -> int:
         object.__setattr__(self, "modes", (*self.modes, self.mode_by_name[name]))
         object.__setattr__(self, "domains", (*self.domains, self.domain_by_name[name]))
-        if "_coded" in self.__dict__:
-            self._coded.add(self.composition.text(name), self.composition.loads_in(name))
+        if "coded" in self.__dict__:
+            self.coded.add(self.composition.text(name), self.composition.loads_in(name))
         return len(self.modes) - 1
 
     @cached_property
@@ -143,8 +143,8 @@ class ComposedModel(Model):
             seen = Observable(surface.observable, formula)
             object.__setattr__(self, "observables", (*self.observables, seen))
             self.observable_index[seen.name] = len(self.observables) - 1
-        if "_coded" in self.__dict__:
-            self._coded.see(surface, formula)
+        if "coded" in self.__dict__:
+            self.coded.see(surface, formula)
         place = len(self.surfaces) - 1
         self.surface_index[name], self.surface_by_name[name] = place, surface
         limit = self.composition.limit(name)
@@ -319,7 +319,7 @@ class ComposedModel(Model):
     # ------------------------------------------------------------------------------------- flow
 
     @cached_property
-    def _coded(self) -> CodedFlow:
+    def coded(self) -> CodedFlow:
         """The flow of the modes that were visited, in that order: the first is that in which none acts."""
         from contfric.models.coded import Forms
         from contfric.models.coded_flow import CodedFlow
@@ -335,7 +335,7 @@ class ComposedModel(Model):
     @cached_property
     def flow(self) -> CompiledFlow:
         """The compiled flow of the modes that were visited; it grows with them."""
-        return self._coded.flow
+        return self.coded.flow
 
     def state_and_rate(
         self, mode: int, t: float, y: FloatArray, vector: FloatArray
@@ -344,8 +344,8 @@ class ComposedModel(Model):
         none, nothing = np.empty(0, dtype=np.int64), np.empty((0, 0))
         state, rate = y.copy(), np.empty(len(y))
         if self.modes[mode].sliding:
-            self._coded.onto(mode, t, y, vector, none, state, nothing)
-        self._coded.field(mode, t, state, vector, none, rate, nothing)
+            self.coded.onto(mode, t, y, vector, none, state, nothing)
+        self.coded.field(mode, t, state, vector, none, rate, nothing)
         return state, rate
 
     @property

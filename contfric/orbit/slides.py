@@ -60,10 +60,8 @@ def slides_of(orbit: Orbit) -> list[int]:
     for k, i in enumerate(some if not all(goes_on) else ()):
         if orbit.itinerary[i][0] in sliding or stands_still(orbit, i):
             continue
-        first = k
-        while goes_on[
-            first
-        ]:  # what it goes on from may stand still: in other itineraries that is a part of it
+        first = k  # what it goes on from may stand still: in other itineraries that is a part of it
+        while goes_on[first]:
             first -= 1
         found.add(some[first])
     return sorted(found) or [i for i in some if orbit.itinerary[i][0] not in sliding] or [0]

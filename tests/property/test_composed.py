@@ -10,6 +10,7 @@ import pytest
 import contfric as cf
 from contfric.errors import ModelError, ParameterError
 from contfric.models import structure as reading
+from contfric.models.check.probe import Probe
 from contfric.models.definition import FloatArray
 from contfric.signature.holds import comes_to_rest, ends_rest, left_surface
 
@@ -261,3 +262,17 @@ def test_a_slip_that_vanishes_is_one_event_to_its_end() -> None:
     assert abs(event.params["Omega"] - 0.95633425311519) < 1e-11
     orbit = event.orbit
     assert np.min(orbit.ends[:, 0] - orbit.cycle[:, 0]) < 1e-5 * orbit.period
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_field_of_a_visited_mode_is_that_of_its_flow(seed: int) -> None:
+    """It was read from tables that ended before it: an excitation was said to have another period."""
+    model = chain(5, 6, f"field-{seed}")
+    cf.simulate(model, periods=4)
+    probe, rng = Probe(model, model.defaults, seed=seed), np.random.default_rng(seed)
+    assert len(model.modes) > 4
+    for mode in model.modes:
+        t, guess = float(rng.uniform(0.0, 6.0)), rng.normal(size=len(model.states))
+        y = probe.flow.state(mode.name, t, guess, 0.0)
+        rate = probe.flow.jacobian(mode.name, t, y, 0.0)[:, 1 + len(y)]
+        assert probe.field(mode.name, t, y) == pytest.approx(rate, abs=1e-12)

@@ -38,6 +38,8 @@ from contfric.flow.linear.system import REACH, TERMS, FloatArray, start_waves, t
 
 #: A solution that is no longer than this, in steps, takes one step: the search allows a little more.
 _ONE_STEP = 1.04
+#: Where the length of the step is in a slot of an observable: it has no responses.
+STEP = FORCED
 #: Rows with waves, against the number of frequencies, up to which responses to unit forces are kept.
 _FEW = 4
 
@@ -47,7 +49,7 @@ class Sight(NamedTuple):
 
     Attributes
     ----------
-    head : the matrix that it is of
+    head : the matrix that it is of, and the length of the step
     co : coefficients of the observable
     rows : W_m in columns, (n, TERMS + 1)
     """
@@ -88,7 +90,7 @@ def write_rows(motion, c, h, ladder, sight, system):  # type: ignore[no-untyped-
         row, following = following, row
         for i in range(n):
             system.work[row, i] *= h / (m + 1.0)
-    sight.head[OF], sight.head[FORCED] = ladder.head[STAMP], 1.0
+    sight.head[OF], sight.head[STEP] = ladder.head[STAMP], h
 
 
 @helper
@@ -134,7 +136,8 @@ def sight_of(motion, piece, c, rate, spread, grown, dt, co, memory, space, seen,
     slots, _ = places_in(memory, n, entries, waves)
     at, known = find(memory, piece, -1.0 - c, ladder.head[STAMP], -1, slots)
     sight = sight_in(memory, at, n, entries)
-    if not (known and same(sight.co, co, entries)):
+    # frequencies may set the step: of one matrix there are steps of several lengths
+    if not (known and sight.head[STEP] == step and same(sight.co, co, entries)):
         for j in range(entries):
             sight.co[j] = co[j]
         write_rows(motion, c, step, ladder, sight, system)
