@@ -175,8 +175,10 @@ def begins_at_short(state: Exploration, event: Event) -> None:
     """
     if len(event.branches) != 1 or not is_short(state.branches[event.branches[0]]):
         return
-    b, width = event.bifurcation, state.settings.width
-    near = nearest(b.orbit)
+    b, near = event.bifurcation, nearest(event.bifurcation.orbit)
+    active = b.orbit.model.index_of(state.settings.parameter)
+    value = float(b.orbit.vector[active])
+    size = b.orbit.model.size_of(active, value)
     for index, branch in enumerate(state.branches):
         system = branch.system
         if not system.holds or system.half or system.periods != b.orbit.as_whole().periods:
@@ -185,8 +187,8 @@ def begins_at_short(state: Exploration, event: Event) -> None:
             other = end.bifurcation
             if other is None or not same_kind(other, b):
                 continue
-            gap = abs(other.params[branch.parameter] - b.params[branch.parameter]) / width
-            if gap < near and other.outline.apart(b.outline) < near:
+            gap = abs(other.params[branch.parameter] - value)
+            if gap < near * size and other.outline.apart(b.outline) < near:
                 state.end_at(index, k, event)
                 text = "the bridge that begins just after it"
                 state.judge(event, text, Decision.KNOWN, index)

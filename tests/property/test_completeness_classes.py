@@ -434,6 +434,17 @@ def test_a_bridge_that_begins_where_a_short_branch_ends() -> None:
         assert explored.verify(restarts=4).passed, damping
 
 
+@pytest.mark.parametrize("share", [1.0, 0.7, 1.3, 0.4])
+def test_where_a_bridge_begins_does_not_depend_on_the_range(share: float) -> None:
+    """A short branch and the next event are 1e-5 apart: whatever part of a narrow range that is."""
+    found = restarts.scene(55, 321)
+    damping = share * found.params["zeta"]
+    orbit = cf.find_orbit("coulomb", {**found.params, "zeta": damping}, longest=1000)
+    explored = cf.explore(orbit, "h", (0.005, 0.03))
+    assert len(explored.branches) == 11 and not explored.loose_ends
+    assert explored.verify(restarts=0).passed
+
+
 def test_what_leaves_a_branch_point_does_not_begin_beyond_an_event() -> None:
     """Damping of 1e-9: a bridge ends 1e-8 from a branch point, nearer than what leaves it can be started."""
     found = restarts.scene(42, 56)
