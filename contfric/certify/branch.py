@@ -182,19 +182,6 @@ class BranchCertificate(Shown):
         )
 
 
-def latest(time_limit: float | None) -> float:
-    """Return when to end, by ``time.time``, for a limit in seconds from now.
-
-    Raises
-    ------
-    ParameterError
-        If the limit is not positive.
-    """
-    if time_limit is not None and not time_limit > 0:
-        raise ParameterError(f"time_limit is a number of seconds above 0, got {time_limit}")
-    return math.inf if time_limit is None else time.time() + time_limit
-
-
 def certify_branch(
     branch: Branch, until: float = math.inf, progress: Callable[[str], None] | None = None
 ) -> BranchCertificate:
@@ -223,7 +210,7 @@ def certify_branch(
     for orbit in branch:
         if time.time() > until:
             break
-        points.append(certify_orbit(orbit, inside=False))
+        points.append(certify_orbit(orbit, inside=False, until=until))
     with working(_BITS):
         tracer = Tracer(branch, proofs, until, points)
         pieces, steps, k = list[Piece](), len(branch) - 1, 0
@@ -235,7 +222,7 @@ def certify_branch(
     points = [
         replace(point, admissible=Finding(Verdict.PROVED))  # all orbits of its box are
         if k in tracer.obeying
-        else with_inequalities(point)
+        else with_inequalities(point, until)
         for k, point in enumerate(points)
     ]
     held = frozenset(tracer.held)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from contfric.base.shown import Shown
+from contfric.certify.limit import LATE
 from contfric.certify.verdict import Finding, Verdict, all_of
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ class Certificate(Shown):
     kept : int
         How many numbers the orbit keeps, whatever they are, as contacts never slip: it is unique among those
         that keep what the printed one does, and the multipliers 1 of the others are not among its own.
+    ended : bool
+        Whether a time limit ended the work; what it has shown until then stands.
     """
 
     orbit: Orbit
@@ -53,6 +56,7 @@ class Certificate(Shown):
     multipliers: list[acb]
     precision: int
     kept: int = 0
+    ended: bool = False
 
     @property
     def proved(self) -> bool:
@@ -84,6 +88,8 @@ class Certificate(Shown):
             found.append(f"stability {self.stable}")
         elif not found:
             found.append("the stability that is proved is not the one that the orbit states")
+        if self.ended and not any(LATE in text for text in found):
+            found.append(f"more digits {LATE}")
         return "; ".join(found)
 
     @property

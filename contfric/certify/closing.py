@@ -2,10 +2,13 @@
 
 Over whole periods the extended state ``(y, 1, cos w_k t, sin w_k t)`` is the same. Over half a period,
 with ``w_k T = 2 pi n_k``, it is ``D (y, 1, ...)``, D = diag(K, 1, (-1)^n_k). The second half of a
-symmetric orbit is the image of the first one if the images of fields and surfaces are those of the image
-mode:
+symmetric orbit is the image of the first one if the images of fields, surfaces and resets are those of the
+image mode and of the image surface:
 
-    M_m' D = D M_m,        g_F' D = -g_F .
+    M_m' D = D M_m,        g_F' D = -g_F,        R_F' D = D R_F .
+
+Which modes a reset acts in, and which one it leads into, is no matter of formulas: the problem of the whole
+orbit, read from the model, must have on its second half what the symmetry makes of the first one.
 """
 
 from __future__ import annotations
@@ -16,9 +19,10 @@ from contfric.certify.chain import Segments
 from contfric.certify.zeros import Closing
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import numbers, zeros
+from contfric.orbit.itineraries import whole_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.structure import mirror_mode
-from contfric.orbit.system import System
+from contfric.orbit.system import Layout, System, build_system
 
 
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:
@@ -51,7 +55,9 @@ def is_symmetry(orbit: Orbit, segments: Segments, model: BallModel) -> bool:
     with slopes that are exact too, over the ball of the parameter, for all its values.
     """
     symmetry = orbit.model.symmetry
-    if symmetry is None or symmetry.fraction != 0.5 or orbit.periods % 2 == 0 or model.resets:
+    if symmetry is None or symmetry.fraction != 0.5 or orbit.periods % 2 == 0:
+        return False
+    if model.resets and not _acts_alike(orbit.system):
         return False
     if model.mirrored is not None:
         image = mirror_mode(orbit.model)
@@ -65,9 +71,11 @@ def is_symmetry(orbit: Orbit, segments: Segments, model: BallModel) -> bool:
 
 
 def keeps(system: System, segments: Segments, model: BallModel, matrices: BallModel) -> bool:
-    """Tell whether the images of fields and surfaces (or of their slopes) are those of the image mode."""
-    symmetry = system.model.symmetry
+    """Tell whether the images of fields, surfaces and resets (or of their slopes) are those of the model."""
+    symmetry, resets = system.model.symmetry, matrices.resets
     assert symmetry is not None
+    if any((name in resets) != (to in resets) for name, to in symmetry.surfaces.items()):
+        return False
     matrix, image = closure_matrix(segments, model, True), mirror_mode(system.model)
     gaps = [
         matrices.fields[image[mode]] * matrix - matrix * matrices.fields[mode]
@@ -77,4 +85,38 @@ def keeps(system: System, segments: Segments, model: BallModel, matrices: BallMo
         matrices.surfaces[to] * matrix - matrices.surfaces[name] * symmetry.sense(name)
         for name, to in symmetry.surfaces.items()
     ]
+    gaps += [
+        resets[to] * matrix - matrix * resets[name]
+        for name, to in symmetry.surfaces.items()
+        if name in resets
+    ]
     return all(x.is_zero() for gap in gaps for x in gap.entries())
+
+
+def _acts_alike(system: System) -> bool:
+    """Tell whether the problem of the whole orbit asks what its half does, and the image of that."""
+    model, count = system.model, system.segments
+    try:
+        whole = build_system(model, whole_of(model, system.itinerary, True), system.periods)
+    except ValueError:  # the image of a reset leads nowhere
+        return False
+    symmetry, names = model.symmetry, [s.name for s in model.surfaces]
+    assert symmetry is not None
+
+    def image(i: int, surface: int, sign: int, *where: int) -> tuple[int, ...]:
+        name = names[surface]
+        to = names.index(symmetry.surfaces[name])
+        return i + count, to, symmetry.sense(name) * sign, *where
+
+    rows = _rows(system.layout)
+    return _rows(whole.layout) == rows | {(what, image(*row)) for what, row in rows}
+
+
+def _rows(layout: Layout) -> set[tuple[str, tuple[int, ...]]]:
+    """Return what a problem asks of each segment: sides of surfaces, its exit, the reset before it."""
+    interior, joint = layout.interior.tolist(), layout.joint.tolist()
+    signs = layout.exit_signs.astype(int).tolist()
+    exits = zip(range(len(signs)), layout.exits.tolist(), signs, strict=True)
+    resets = ((i, surface, 0) for i, surface in enumerate(layout.resets.tolist()) if surface >= 0)
+    asked = {"interior": interior, "joint": joint, "exit": exits, "reset": resets}
+    return {(what, tuple(row)) for what, rows in asked.items() for row in rows}

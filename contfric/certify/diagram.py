@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 from contfric.atlas.diagram import Diagram
-from contfric.certify.branch import BranchCertificate, certify_branch, latest
+from contfric.certify.branch import BranchCertificate, certify_branch
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -23,8 +23,9 @@ from contfric.certify.diagram_certificate import (
     Gap,
     merged,
 )
-from contfric.certify.events import LATE, EventCertificate, certify_event
+from contfric.certify.events import EventCertificate, certify_event
 from contfric.certify.files import checkable, checked
+from contfric.certify.limit import LATE, latest
 from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch

@@ -9,7 +9,6 @@ falls (SS), a touch has a second derivative.
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,6 +30,7 @@ from contfric.certify.extended import (
 from contfric.certify.inequalities import Touch, grazes_at_end, inequalities
 from contfric.certify.kept import Kept, with_kept
 from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
+from contfric.certify.limit import LATE, TimeOverError, check_time
 from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.events import ACCURACY, Bifurcation, Kind
@@ -46,17 +46,6 @@ from contfric.orbit.orbit import Orbit
 _BITS = (160, 320)
 #: Bits of the working precision that rounding may take.
 _SPARE = 30
-#: What is said of an event that a time limit has ended, or left out.
-LATE = "not reached within the time limit"
-
-
-class _TimeOverError(Exception):
-    """The time for an attempt is over."""
-
-
-def _check_time(until: float) -> None:
-    if time.time() > until:
-        raise _TimeOverError
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,7 +168,7 @@ def certify_event(
     ball_model(event.orbit.model, event.params)  # whether proofs are offered
     found = replace(_undecided(event, parameter, LATE), ended=True)
     try:
-        _check_time(until)
+        check_time(until)
         location = location_of(event)
         for bits in _BITS:
             with working(bits):
@@ -189,7 +178,7 @@ def certify_event(
                 break
     except NotLocatedError as error:
         return _undecided(event, parameter, str(error))
-    except _TimeOverError:  # with fewer digits it may have been tried
+    except TimeOverError:  # with fewer digits it may have been tried
         pass
     return found
 
@@ -228,7 +217,7 @@ def _attempt(
     params = dict(event.params)
 
     def build(value: arb) -> BallModel:  # for each evaluation of the equations
-        _check_time(until)
+        check_time(until)
         return ball_model(orbit.model, params, parameter, value)
 
     equations, start = _extended(event, location, segments, build)
@@ -366,6 +355,6 @@ def _admissible(
     plain = Chain(chain.segments, replace(chain.model, slopes=None))
     found = []
     for inequality in inequalities(plain, orbit.system, chain.joints(z), closing, touch):
-        _check_time(until)
+        check_time(until)
         found.append(inequality.named(orbit.system))
     return all_of(found)

@@ -16,6 +16,7 @@ The stated error of the joints is what rounding of the flow and the residual do 
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from flint import acb, arb, arb_mat
@@ -26,6 +27,7 @@ from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.inequalities import inequalities
 from contfric.certify.kept import with_kept
 from contfric.certify.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
+from contfric.certify.limit import LATE, TimeOverError, check_time
 from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.certify.zeros import zeros_at_joints
@@ -47,12 +49,13 @@ _FAMILY = "it is one of a family of orbits, and it is not known exactly what a c
 NOT_YET = Finding(Verdict.UNDECIDED, "not looked at")
 
 
-def certify_orbit(orbit: Orbit, inside: bool = True) -> Certificate:
+def certify_orbit(orbit: Orbit, inside: bool = True, until: float = math.inf) -> Certificate:
     """Prove what can be proved of an orbit.
 
     Parameters
     ----------
     inside : whether its inequalities are looked at; else the finding on them is NOT_YET
+    until : when to end, by ``time.time``: within one product of matrices, or one inequality
 
     Raises
     ------
@@ -67,26 +70,34 @@ def certify_orbit(orbit: Orbit, inside: bool = True) -> Certificate:
     """
     orbit = provable_form(orbit)
     segments = segments_of(orbit.system)
-    found: Certificate | None = None
-    for bits in _BITS:
-        with working(bits):
-            found = _attempt(orbit, segments, bits, inside)
-        if _is_proved(found) or Verdict.REFUTED in (found.exists.verdict, found.admissible.verdict):
-            break
-    assert found is not None
+    found = _nothing(orbit, LATE, _BITS[0])
+    try:
+        for bits in _BITS:
+            check_time(until)
+            with working(bits):
+                found = _attempt(orbit, segments, bits, inside, until)
+            refuted = Verdict.REFUTED in (found.exists.verdict, found.admissible.verdict)
+            if _is_proved(found) or refuted or found.ended:
+                break
+    except TimeOverError:  # with fewer digits it may have been tried
+        return replace(found, ended=True)
     return found
 
 
-def with_inequalities(found: Certificate) -> Certificate:
+def with_inequalities(found: Certificate, until: float = math.inf) -> Certificate:
     """Return a certificate with the finding on the inequalities, if they were not looked at."""
     if found.admissible is not NOT_YET:
         return found
     orbit, bits = found.orbit, found.precision
     with working(bits):
         chain = Chain(segments_of(orbit.system), ball_model(orbit.model, orbit.params))
-        found = replace(found, admissible=_obeys(orbit, chain, chain.joints(found.enclosure)))
+        admissible = _obeys(orbit, chain, chain.joints(found.enclosure), until)
+        found = replace(found, admissible=admissible, ended=found.ended or admissible.why == LATE)
     undecided = found.admissible.verdict is Verdict.UNDECIDED and bits < _BITS[-1]
-    return certify_orbit(orbit) if undecided else found
+    if not undecided or found.ended:
+        return found
+    again = certify_orbit(orbit, until=until)
+    return replace(found, ended=True) if again.ended else again
 
 
 def _is_proved(found: Certificate) -> bool:
@@ -115,12 +126,15 @@ def stated_error(orbit: Orbit, inverse: arb_mat) -> Vector:
     ]
 
 
-def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certificate:
+def _attempt(
+    orbit: Orbit, segments: Segments, bits: int, inside: bool, until: float
+) -> Certificate:
     model = ball_model(orbit.model, orbit.params)
     printed = [arb(float(x)) for x in orbit.joints.ravel()]
     segments = with_kept(segments, model, orbit.joints[0])
 
     def equations(x: Vector) -> tuple[Vector, arb_mat]:
+        check_time(until)
         residual, rows = Chain(segments, model).linearised(x)
         return residual, arb_mat(rows)
 
@@ -135,7 +149,12 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certi
             orbit, "no solution so near to the printed joints", bits, Verdict.REFUTED, radii
         )
     chain = Chain(segments, model)
-    zero = narrowed(chain.residual, box, printed, radii)
+
+    def residual_at(x: Vector) -> Vector:
+        check_time(until)
+        return chain.residual(x)
+
+    zero = narrowed(residual_at, box, printed, radii)
     if zero is None:
         thin = enclosed(equations, printed, arb(2) ** (_SPARE - bits))
         if thin.verdict is not Verdict.PROVED:
@@ -152,10 +171,13 @@ def _attempt(orbit: Orbit, segments: Segments, bits: int, inside: bool) -> Certi
         )
     admissible, joints = NOT_YET, chain.joints(zero)
     if inside:
-        admissible = _obeys(orbit, chain, joints)
-    discs, stable = _stability(orbit, chain, joints)
+        admissible = _obeys(orbit, chain, joints, until)
+    late = admissible.why == LATE
+    discs, stable = ([], admissible) if late else _stability(orbit, chain, joints)
     return Certificate(
-        orbit, exists, unique, admissible, stable, radii, zero, discs, bits, len(segments.kept)
+        *(orbit, exists, unique, admissible, stable, radii, zero, discs, bits),
+        kept=len(segments.kept),
+        ended=late,
     )
 
 
@@ -163,11 +185,17 @@ def _singular(orbit: Orbit, where: str) -> str:
     return _FAMILY if len(orbit.system.layout.conserved) else f"the equations are singular {where}"
 
 
-def _obeys(orbit: Orbit, chain: Chain, joints: list[Vector]) -> Finding:
+def _obeys(orbit: Orbit, chain: Chain, joints: list[Vector], until: float) -> Finding:
     """Return whether the solution with joints in some balls obeys every inequality."""
     closing = closing_of(chain.segments, chain.model, orbit.system.half)
-    every = inequalities(chain, orbit.system, joints, closing)
-    return all_of([found.named(orbit.system) for found in every])
+    found = list[Finding]()
+    try:
+        for inequality in inequalities(chain, orbit.system, joints, closing):
+            check_time(until)
+            found.append(inequality.named(orbit.system))
+    except TimeOverError:
+        found = [Finding(Verdict.UNDECIDED, LATE), *found]
+    return all_of(found)
 
 
 def _stability(orbit: Orbit, chain: Chain, joints: list[Vector]) -> tuple[list[acb], Finding]:

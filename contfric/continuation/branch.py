@@ -348,7 +348,8 @@ class Branch(Shown):
             If proofs are not offered for the model, or the limit is no number above 0.
         """
         need_flint()
-        from contfric.certify.branch import certify_branch, latest
+        from contfric.certify.branch import certify_branch
+        from contfric.certify.limit import latest
 
         return certify_branch(self, latest(time_limit))
 

@@ -364,18 +364,23 @@ class Orbit(MeasuredOrbit):
         columns = dict(zip(self.model.states, states.T, strict=True))
         return as_table({"t": times, **columns, "domain": names})
 
-    def certify(self) -> Certificate:
+    def certify(self, *, time_limit: float | None = None) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).
+
+        Parameters
+        ----------
+        time_limit : seconds (hundreds of segments take minutes) after which what is left is undecided
 
         Raises
         ------
         ParameterError
-            If proofs are not offered for the model.
+            If proofs are not offered for the model, or the limit is no number above 0.
         """
         need_flint()
+        from contfric.certify.limit import latest
         from contfric.certify.orbit import certify_orbit
 
-        return certify_orbit(self)
+        return certify_orbit(self, until=latest(time_limit))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the orbit in the phase plane, coloured by domain."""

@@ -16,6 +16,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.diagram import Diagram
 from contfric.certify import events, files
+from contfric.certify import limit as time_limit
 from contfric.certify.diagram_certificate import (
     DiagramCertificate,
     Gap,
@@ -96,14 +97,14 @@ def test_an_event_ends_at_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> Non
         evaluations.append(args)
         return ball_model(*args)
 
-    monkeypatch.setattr(events, "time", SimpleNamespace(time=clock))
+    monkeypatch.setattr(time_limit, "time", SimpleNamespace(time=clock))
     monkeypatch.setattr(events, "ball_model", counted)
     assert certify_event(event, "Omega").proved
     whole = len(evaluations)
     for limit in range(whole):
         evaluations.clear()
         found = certify_event(event, "Omega", until=limit)
-        assert found.ended and events.LATE in found.why
+        assert found.ended and time_limit.LATE in found.why
         assert len(evaluations) == limit + 1
 
 

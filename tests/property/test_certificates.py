@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from flint import arb, arb_mat, ctx
 
 import contfric as cf
+from contfric.certify import limit
 from contfric.certify.multipliers import stability, turn_multipliers
 from contfric.certify.orbit import certify_orbit, with_inequalities
 from contfric.certify.sign import Path, positive, touched
@@ -320,3 +322,43 @@ def test_in_span_is_exact() -> None:
     assert in_span([arb(2), arb(5), arb(1)], [one, two])
     assert not in_span([arb(2), arb(5), arb(1) + arb(2) ** -40], [one, two])
     assert not in_span([arb(2), arb(5), arb(1, 1e-30)], [one, two])  # a ball is not its centre
+
+
+@pytest.mark.parametrize("name", ["1a", "2s"])
+def test_an_orbit_ends_at_the_time_limit(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever it comes: the clock is not read again, what is shown by then stands, and the rest is said."""
+    orbit = cf.solve_orbit("coulomb", name, {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    reads: list[int] = []
+
+    def clock() -> float:
+        reads.append(1)
+        return float(len(reads))
+
+    monkeypatch.setattr(limit, "time", SimpleNamespace(time=clock))
+    whole = certify_orbit(orbit, until=1e9)
+    assert whole.proved and not whole.ended
+    needed, existing = len(reads), 0
+    for last in range(needed):
+        reads.clear()
+        found = certify_orbit(orbit, until=last)
+        assert found.ended and not found.proved and limit.LATE in found.why
+        assert len(reads) == last + 1
+        existing += found.exists.proved
+        for part in ("exists", "unique", "admissible", "stable"):
+            ours = getattr(found, part)
+            assert ours.why == limit.LATE or ours == getattr(whole, part) or not found.exists.proved
+    assert 0 < existing < needed
+    reads.clear()
+    assert certify_orbit(orbit, until=needed).proved
+
+
+def test_a_limit_in_seconds_ends_the_proof_of_an_orbit() -> None:
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    found = orbit.certify(time_limit=1e-9)
+    assert (
+        found.ended and "time limit" in repr(found) and found.why.startswith("existence undecided")
+    )
+    assert orbit.certify(time_limit=1e9).proved
+    for wrong in (0, -1.0, float("nan")):
+        with pytest.raises(cf.ParameterError, match="time_limit"):
+            orbit.certify(time_limit=wrong)

@@ -202,24 +202,25 @@ def alike(affine: AffineModel, surface: str, mode: str) -> str | None:
 
 @lru_cache(maxsize=256)
 def mirrored(affine: AffineModel, closure: Closure, modes: Pairs, surfaces: SignedPairs) -> bool:
-    """Tell whether a symmetry of half a period maps fields and surfaces to those of the image modes.
+    """Tell whether a symmetry of half a period maps fields, surfaces and resets to those of the images.
 
-    In symbols: ``M' D = K M`` and ``g' D = -g`` or g, D = diag(K, 1, (-1)^n_k), as in
+    In symbols: ``M' D = K M``, ``g' D = -g`` or g, and ``R' D = K R``, D = diag(K, 1, (-1)^n_k), as in
     :mod:`contfric.certify.closing`.
     """
     n, turns = affine.states, affine.turns
     k = sympy.Matrix(n, n, [sympy.Rational(c) for row in closure for c in row])
     waves = [(-1) ** turn for turn in turns for _ in range(2)]
     d = sympy.diag(k, 1, *waves)
-    gaps = [
-        sympy.Matrix(affine.fields[to]) * d - k * sympy.Matrix(affine.fields[mode])
-        for mode, to in modes
-    ]
-    gaps += [
-        sympy.Matrix(affine.surfaces[to]) * d - sign * sympy.Matrix(affine.surfaces[name])
-        for name, to, sign in surfaces
-    ]
-    return all(sympy.expand(x) == 0 for gap in gaps for x in gap)
+
+    def gap(group: Mapping[str, list[list[Any]]], name: str, to: str, factor: Any) -> Any:
+        return sympy.Matrix(group[to]) * d - factor * sympy.Matrix(group[name])
+
+    if any((name in affine.resets) != (to in affine.resets) for name, to, _ in surfaces):
+        return False
+    gaps = [gap(affine.fields, mode, to, k) for mode, to in modes]
+    gaps += [gap(affine.surfaces, name, to, sign) for name, to, sign in surfaces]
+    gaps += [gap(affine.resets, name, to, k) for name, to, _ in surfaces if name in affine.resets]
+    return all(sympy.expand(x) == 0 for rows in gaps for x in rows)
 
 
 def _affine(formulas: Formulas, texts: list[Any], what: str, name: str) -> list[AffineForm]:

@@ -55,8 +55,8 @@ class BallModel:
         Returns the surface whose row is the rate of another one along a mode, or its negative, identically in
         the parameters: balls of the two rows do not show it.
     mirrored : callable or None
-        Tells whether a symmetry of half a period maps modes and surfaces as it should, identically in the
-        parameters: of a closure, of pairs of modes, and of pairs of surfaces with their signs.
+        Tells whether a symmetry of half a period maps modes, surfaces and resets as it should, identically in
+        the parameters: of a closure, of pairs of modes, and of pairs of surfaces with their signs.
     unscaled : dict
         Fields that are these but for a positive factor of the states, and without its rounding; if there are.
     kept : frozenset
