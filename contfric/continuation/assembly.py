@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import ACCURACY, Bifurcation, End, Kind
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, Kind
 from contfric.continuation.openings import with_openings
 from contfric.continuation.passed_families import with_families
 from contfric.continuation.points import Point, Settings
@@ -78,7 +78,7 @@ def _branch(
     origin: Point | None = None,
 ) -> Branch:
     columns = _joined(behind, ahead, origin)
-    bifurcations, unknown = _known(bifurcations, columns["values"], settings)
+    bifurcations, unknown = _known(bifurcations, ends, columns, settings)
     if behind is None:
         ends = _told_upward(ends[0], columns["values"]), ends[1]
     events = [end.bifurcation for end in ends]
@@ -109,18 +109,16 @@ def _branch(
 
 
 def _known(
-    events: tuple[Bifurcation, ...], values: FloatArray, settings: Settings
+    events: tuple[Bifurcation, ...],
+    ends: tuple[End, End],
+    columns: dict[str, NDArray[Any]],
+    settings: Settings,
 ) -> tuple[tuple[Bifurcation, ...], list[str]]:
-    """Return the events without folds that are not known to be any, and a note for each of these.
-
-    Where the parameter changes by less over the whole branch than a fold's is known to, the sign of its slope
-    is rounding: a branch between two events in one location, next to a continuum of orbits.
-    """
+    """Return the events without folds that are not known to be any, and a note for each of these."""
     kept, notes = [], []
-    span = float(np.ptp(values)) if len(values) else 0.0
     for b in events:
-        narrow = b.kind is Kind.SN and span < _NARROW * settings.width
-        if narrow and span <= b.accuracy * settings.width:
+        turns = _turns_by(b, ends, columns, settings.parameter) if b.kind is Kind.SN else np.inf
+        if turns < _NARROW * settings.width and turns <= b.accuracy * settings.width:
             location = f"{settings.parameter} = {b.params[settings.parameter]:.12g}"
             notes.append(
                 f"{location}: the slope changes its sign within rounding, no fold is listed"
@@ -128,6 +126,23 @@ def _known(
         else:
             kept.append(b)
     return tuple(kept), notes
+
+
+def _turns_by(
+    fold: Bifurcation, ends: tuple[End, End], columns: dict[str, NDArray[Any]], name: str
+) -> float:
+    """Return by how much the parameter changes over a branch, or from a fold to a sliding event at its end.
+
+    If that is less than a fold's is known to, the sign of the slope is rounding: on a branch between two
+    events in one location, next to a continuum of orbits, or where the equations are singular at the end.
+    """
+    values, arc = columns["values"], columns["arc"]
+    turns = float(np.ptp(values)) if len(values) else 0.0
+    for end, beyond in zip(ends, (arc <= fold.position, arc >= fold.position), strict=True):
+        if (last := end.bifurcation) is not None and last.kind in TERMINAL:
+            part = np.append(values[beyond], last.params[name]) - fold.params[name]
+            turns = min(turns, float(np.abs(part).max()))
+    return turns
 
 
 def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:

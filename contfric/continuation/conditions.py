@@ -274,9 +274,9 @@ def possible(
     if not sequences:
         return []
     most = max(len(r.signed) for r in relations)
-    rows, margins, signed = (
-        np.array(part) for part in zip(*(_padded(r, most) for r in relations), strict=True)
-    )
+    limits = max(len(r.margins) for r in relations)
+    padded = (_padded(r, most, limits) for r in relations)
+    rows, margins, signed = (np.array(part) for part in zip(*padded, strict=True))
     chosen = np.array(sequences)
     count, length = chosen.shape
     m = (rows.shape[2] - 1 - most) // 2
@@ -311,18 +311,16 @@ def possible(
     ]
 
 
-def _padded(relation: Relation, most: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return a relation with as many freedoms as others have; those that come in are zero."""
+def _padded(
+    relation: Relation, most: int, limits: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a relation with as many freedoms and margins as others have; those that come in are zero."""
     m2 = relation.rows.shape[1] - len(relation.signed)
     more = most - len(relation.signed)
     rows = np.zeros((relation.rows.shape[0] + more, m2 + most))
     rows[: len(relation.rows), : relation.rows.shape[1]] = relation.rows
     for k in range(more):
         rows[len(relation.rows) + k, relation.rows.shape[1] + k] = 1.0
-    margins = np.zeros((_MOST_MARGINS, m2 + most))
+    margins = np.zeros((limits, m2 + most))
     margins[: len(relation.margins), : relation.rows.shape[1]] = relation.margins
     return rows, margins, np.concatenate([relation.signed, np.zeros(more)])
-
-
-#: Margins of a unit that vanish at once; others are not looked at here.
-_MOST_MARGINS = 12

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation import resolve, smooth
 from contfric.continuation.events import Kind
+from contfric.continuation.points import LARGEST_STEP
 
 RANGE = (-0.39, -0.15)
 
@@ -64,3 +66,21 @@ def test_no_fold_at_an_event_at_which_the_parameter_stands(monkeypatch, seed):
         assert not _folds(step, rounding)
         if abs(step[1].slope) * (step[4].arc - step[1].arc) > 1e-6:  # else it does not turn visibly
             assert _folds(step, -0.9 * step[1].slope, turns=True)
+
+
+@pytest.mark.parametrize("case", [None, 0])
+def test_no_fold_nearer_to_the_end_than_it_is_known(case):
+    # a bridge ends at a symmetric event, where its equations are singular: the last slope is rounding
+    params = {"Omega": 0.3304912975852031, "S": 0.12321992631306294, "S0": 0.14752034469202718}
+    bounds = (-0.10758881451932725, 0.14092353092033202)
+    if case is not None:
+        random = np.random.default_rng([9494, case])
+        limit = params["S0"] * (1 + random.uniform(-0.1, 0.1))
+        friction = limit * (0.835 + random.uniform(-0.06, 0.06))
+        omega = params["Omega"] * (1 + random.uniform(-0.04, 0.04))
+        params, bounds = {"Omega": omega, "S": friction, "S0": limit}, (-0.11, 0.14)
+    orbit = cf.find_orbit("coulomb", {**params, "h": 0.0, "zeta": 0.0}, longest=1000)
+    diagram = cf.explore(orbit, "h", bounds)
+    first = diagram.branches[0]
+    again = cf.explore(first[len(first) // 2], "h", bounds, max_step=STEP * LARGEST_STEP)
+    assert [*differences(diagram, again), *differences(again, diagram)] == []

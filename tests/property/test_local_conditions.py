@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
 from contfric.continuation.branch import Branch
-from contfric.continuation.conditions import possible, relation_of
+from contfric.continuation.conditions import Relation, possible, relation_of
 from contfric.continuation.events import Kind
 from contfric.continuation.incident import incident_forms, vanishing
 from contfric.continuation.locations import normal_location
@@ -119,3 +120,25 @@ def test_touches_of_motion_without_excitation() -> None:
                 assert possible(relations, [in_turn]) == [(False, False)]
             asked += 1
     assert asked
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_each_sequence_is_told_by_its_own_relations(seed: int) -> None:
+    """However many margins vanish at once in others (it was 12 at most), and however often one is told."""
+    rng = np.random.default_rng(seed)
+    m, relations = 2, []
+    for _ in range(3):
+        k, limits = int(rng.integers(0, 3)), int(rng.integers(0, 20))
+        rows = rng.normal(size=(m + k, 2 * m + 1 + k))
+        some = rng.normal(size=(limits, 2 * m + 1 + k))
+        # signs for which the unit itself exists above the event, or below
+        solved = np.linalg.solve(
+            np.hstack([rows[:, :m] + rows[:, m : 2 * m], rows[:, 2 * m + 1 :]]), -rows[:, 2 * m]
+        )
+        values = some @ np.concatenate([solved[:m], solved[:m], [1.0], solved[m:]])
+        some *= (np.sign(values) * rng.choice([1.0, -1.0]))[:, None]
+        relations.append(Relation(rows, some, np.zeros(k)))
+    chosen = [(0,), (1,), (2,)]
+    alone = [possible([relation], [(0,)])[0] for relation in relations]
+    often = [replace(r, margins=np.repeat(r.margins, 5, axis=0)) for r in relations]
+    assert possible(relations, chosen) == possible(often, chosen) == alone
