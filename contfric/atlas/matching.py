@@ -180,16 +180,18 @@ def inner_orbit(branch: Branch) -> Orbit:
 def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
     """Yield guesses for the orbits of a branch at a value, and their locations, one each time it takes it.
 
-    By interpolation between its points and the folds between them, near which it is a parabola.
+    By interpolation between its points, and the branch points and folds between them: near a fold it is a
+    parabola.
     """
-    arc, values, folds = branch.nodes
+    arc, values, events, _ = branch.nodes
+    folds = [k >= 0 and branch.bifurcations[k].kind is Kind.SN for k in events]
     ahead = values - value
     for k in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
         rise = values[k + 1] - values[k]
         share = 0.0 if rise == 0.0 else -ahead[k] / rise
-        if folds[k + 1] >= 0:
+        if folds[k + 1]:
             share = 1.0 - max(0.0, 1.0 - share) ** 0.5
-        elif folds[k] >= 0:
+        elif folds[k]:
             share = max(0.0, share) ** 0.5
         location = float(arc[k] + share * (arc[k + 1] - arc[k]))
         yield location, replace(branch.between(location), vector=vector)
