@@ -31,6 +31,8 @@ _TELLING = {
 #: Parameters of one event, relative to the range, that differ by rounding alone; and how many of its own
 #: accuracies (it is known to that on either branch) they may differ by.
 ROUNDING, _TWICE = 1e-11, 2.0
+#: Where a branch is looked for on another one, as shares of its length.
+INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
 #: Events this far apart (relative to the range) are two, however badly they are known: how well that is
 #: need not be computed.
 _APART = 0.05
@@ -173,8 +175,16 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
 
 
 def inner_orbit(branch: Branch) -> Orbit:
-    """Return the orbit of a branch nearest to the middle of its arclength: points crowd at a singular end."""
-    return branch[int(np.argmin(np.abs(branch.arc - 0.5 * (branch.arc[0] + branch.arc[-1]))))]
+    """Return the orbit of a branch nearest to the middle of its arclength: points crowd at a singular end.
+
+    It is one that Newton's method finds again if there is any: where rounding of the equations is more than
+    what ends the iteration, as it may be next to a touch, no orbit is recognised.
+    """
+    length = branch.arc[-1] - branch.arc[0]
+    offsets = (np.abs(branch.arc - branch.arc[0] - share * length) for share in INSIDE)
+    first, *others = (branch[int(np.argmin(offset))] for offset in offsets)
+    found = (orbit for orbit in (first, *others) if refine(orbit, damped=False).converged)
+    return next(found, first)
 
 
 def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
