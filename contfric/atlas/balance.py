@@ -312,7 +312,7 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
     Normal in the product in which its arclength is measured, that of the whole range: in that of a narrow
     branch the parameter is all, and along the chord of a sharp bend it says nothing of the arclength.
     """
-    arcs, values, _ = branch.nodes
+    arcs, values, _, _ = branch.nodes
     k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
     length = float(arcs[k] - arcs[k - 1])
     if not length > 0.0:

@@ -12,8 +12,8 @@ from contfric.atlas.leaving_event import settings_for
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
 from contfric.continuation.events import Decision, EndReason
-from contfric.continuation.points import Settings
-from contfric.continuation.switching import leave_along
+from contfric.continuation.points import FIRST_STEP, Settings
+from contfric.continuation.switching import LEAVE, leave_along
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError
 from contfric.models.definition import FloatArray
@@ -24,6 +24,9 @@ from contfric.orbit.solve import refine
 Depart = Callable[[Exploration, Orbit, Event, EndReason, Direction], None]
 #: Cosine above which two directions are the same.
 _ALONG = 0.9
+#: Where a branch through a branch point is begun, in first steps from it: the point is in the middle of one.
+#: A step that ends at the point has no tangent there, and may go on along the other curve.
+_INSIDE_STEP = 0.5
 #: Joints that agree to this are those of the same motion: ends of branches at a branch point are located.
 _SAME = 1e-6
 
@@ -60,8 +63,9 @@ def _follow_through(
     """Continue the branch that passes a branch point in a direction, from just next to it."""
     orbit, settings = crossing.orbit, state.settings
     reason = "the branch that goes on through the event"
+    distance = min(LEAVE, _INSIDE_STEP * FIRST_STEP * settings.largest)
     for way in (direction, direction.reversed()):
-        start = leave_along(orbit, settings, way)
+        start = leave_along(orbit, settings, way, distance)
         if start is None or not settings.low <= start.point.value <= settings.high:
             continue
         active = orbit.model.index_of(settings.parameter)

@@ -31,6 +31,8 @@ _TELLING = {
 #: Parameters of one event, relative to the range, that differ by rounding alone; and how many of its own
 #: accuracies (it is known to that on either branch) they may differ by.
 ROUNDING, _TWICE = 1e-11, 2.0
+#: Where a branch is looked for on another one, as shares of its length.
+INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
 #: Events this far apart (relative to the range) are two, however badly they are known: how well that is
 #: need not be computed.
 _APART = 0.05
@@ -173,23 +175,33 @@ def on_branch(orbit: Orbit, branch: Branch) -> bool:
 
 
 def inner_orbit(branch: Branch) -> Orbit:
-    """Return the orbit of a branch nearest to the middle of its arclength: points crowd at a singular end."""
-    return branch[int(np.argmin(np.abs(branch.arc - 0.5 * (branch.arc[0] + branch.arc[-1]))))]
+    """Return the orbit of a branch nearest to the middle of its arclength: points crowd at a singular end.
+
+    It is one that Newton's method finds again if there is any: where rounding of the equations is more than
+    what ends the iteration, as it may be next to a touch, no orbit is recognised.
+    """
+    length = branch.arc[-1] - branch.arc[0]
+    offsets = (np.abs(branch.arc - branch.arc[0] - share * length) for share in INSIDE)
+    first, *others = (branch[int(np.argmin(offset))] for offset in offsets)
+    found = (orbit for orbit in (first, *others) if refine(orbit, damped=False).converged)
+    return next(found, first)
 
 
 def guesses(branch: Branch, vector: FloatArray, value: float) -> Iterator[tuple[float, Orbit]]:
     """Yield guesses for the orbits of a branch at a value, and their locations, one each time it takes it.
 
-    By interpolation between its points and the folds between them, near which it is a parabola.
+    By interpolation between its points, and the branch points and folds between them: near a fold it is a
+    parabola.
     """
-    arc, values, folds = branch.nodes
+    arc, values, events, _ = branch.nodes
+    folds = [k >= 0 and branch.bifurcations[k].kind is Kind.SN for k in events]
     ahead = values - value
     for k in np.flatnonzero(ahead[:-1] * ahead[1:] <= 0.0):
         rise = values[k + 1] - values[k]
         share = 0.0 if rise == 0.0 else -ahead[k] / rise
-        if folds[k + 1] >= 0:
+        if folds[k + 1]:
             share = 1.0 - max(0.0, 1.0 - share) ** 0.5
-        elif folds[k] >= 0:
+        elif folds[k]:
             share = max(0.0, share) ** 0.5
         location = float(arc[k] + share * (arc[k + 1] - arc[k]))
         yield location, replace(branch.between(location), vector=vector)

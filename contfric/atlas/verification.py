@@ -22,7 +22,7 @@ import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.degenerate import degenerate_events, unresolved
-from contfric.atlas.matching import identity_of, on_branch, same_location
+from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_location
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
@@ -150,8 +150,6 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
 
 # --------------------------------------------------------------------------------- restarts
 
-#: Where a branch is looked for on another one, as shares of its length.
-_INSIDE = (0.5, 0.381966, 0.618034, 0.2, 0.8)
 #: Where a branch is restarted, as shares of its points: in its middle unless the equations are singular.
 _SHARES = (0.5, 0.25, 0.75)
 
@@ -278,9 +276,9 @@ def _covers(known: Branch, branch: Branch) -> bool:
         return False
     # by arclength: near a vertex at which Newton fails there may be a thousand points
     length = float(branch.arc[-1])
-    locations = (int(np.searchsorted(branch.arc, share * length)) for share in _INSIDE)
+    locations = (int(np.searchsorted(branch.arc, share * length)) for share in INSIDE)
     along = (branch[k] for k in locations if 0 < k < len(branch) - 1)
-    ways = along, (_inside(branch, share) for share in _INSIDE), _starts(branch)
+    ways = along, (_inside(branch, share) for share in INSIDE), _starts(branch)
     # most points of a period that grows without bound are at one value, where each would be compared with all
     inside = chain(*(ways[::-1] if _grows(branch) else ways))
     return any(on_branch(orbit, known) for orbit in inside if orbit.converged)

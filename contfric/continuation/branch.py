@@ -15,12 +15,13 @@ from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
-from contfric.continuation.events import Bifurcation, End, Kind
+from contfric.continuation.events import Bifurcation, End
+from contfric.continuation.nodes import Nodes, between, nodes_of
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.itineraries import mirror_pairs, mirrored_labels
 from contfric.orbit.linear import of_two_halves
-from contfric.orbit.orbit import Orbit, Status
+from contfric.orbit.orbit import Orbit
 from contfric.orbit.reading import read_signature
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.system import IntArray, System, build_system
@@ -109,39 +110,13 @@ class Branch(Shown):
         return Orbit(self.system, self.joints[index], vector, 0.0)
 
     @cached_property
-    def nodes(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Points and the folds between them: arclength, parameter, and which fold it is (-1 for a point)."""
-        folds = [
-            (b.position, b.params[self.parameter], k)
-            for k, b in enumerate(self.bifurcations)
-            if b.kind is Kind.SN and b.located and b.orbit.system is self.system
-        ]
-        arc = np.concatenate([self.arc, [f[0] for f in folds]])
-        order = np.argsort(arc, kind="stable")
-        values = np.concatenate([self.values, [f[1] for f in folds]])
-        which = np.concatenate([np.full(len(self), -1), np.array([f[2] for f in folds], dtype=int)])
-        return arc[order], values[order], which[order]
+    def nodes(self) -> Nodes:
+        """Points, and the folds and branch points between them."""
+        return nodes_of(self)
 
     def between(self, arc: float) -> Orbit:
         """Return what lies at an arclength by interpolation: an orbit that is not solved."""
-        arcs, values, folds = self.nodes
-        k = int(np.clip(np.searchsorted(arcs, arc), 1, len(arcs) - 1))
-        length = arcs[k] - arcs[k - 1]
-        share = (arc - arcs[k - 1]) / length if length > 0.0 else 0.0
-        vector = self.vector.copy()
-        vector[self.model.index_of(self.parameter)] = values[k - 1] + share * (
-            values[k] - values[k - 1]
-        )
-        points = k - int(np.sum(folds[:k] >= 0))  # points before this node
-        first, last = (
-            self.joints[points - 1 if side else points]
-            if fold < 0
-            else self.bifurcations[fold].orbit.joints
-            for side, fold in ((1, folds[k - 1]), (0, folds[k]))
-        )
-        return Orbit(
-            self.system, first + share * (last - first), vector, np.inf, Status.NOT_CONVERGED
-        )
+        return between(self, arc)
 
     def __iter__(self) -> Iterator[Orbit]:
         return (self[i] for i in range(len(self)))

@@ -88,7 +88,7 @@ def is_continuum(branch: Branch) -> bool:
     return (
         branch.arc[-1] > _LENGTH
         and _at_one_value(branch, branch.values)
-        and _at_one_value(branch, branch.nodes[1])
+        and _at_one_value(branch, branch.nodes.values)
     )
 
 

@@ -10,10 +10,12 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.crossings import whole_branch
-from contfric.continuation.crossing import _ChainProblem, crossing_near
+from contfric.atlas.matching import on_branch
+from contfric.continuation.crossing import LOCATED, _ChainProblem, crossing_near
 from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.side import first_point
+from contfric.continuation.switching import leave_along
 from contfric.continuation.vertex_ends import stalled_at
 
 MODEL = Path(__file__).parents[1] / "models" / "crossing.yaml"
@@ -186,3 +188,31 @@ def test_a_range_beyond_a_limit_of_the_model_has_one_step_for_all_branches() -> 
     first, other = cf.continue_orbit(orbit, "S", (0.1, 2.0)), whole_branch(orbit, asked)
     assert np.array_equal(other.values, first.values)
     assert np.array_equal(other.joints, first.joints)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_four_arms_leave_a_branch_point_where_the_curves_make_a_small_angle(seed: int) -> None:
+    """A step that ended at the point went on along the other curve, and one curve was taken for the other."""
+    rng = np.random.default_rng([62, seed])
+    centre = {"vb": 0.2368, "k": 1.3167, "beta": 1.176, "S": 0.645}
+    moved = {name: value * (1.0 + rng.uniform(-0.003, 0.003)) for name, value in centre.items()}
+    step = (None, 0.01, 0.02)[seed % 3]
+    diagram = cf.explore(cf.find_orbit("two-blocks", moved), "vb", (0.2, 0.29), max_step=step)
+    (event,) = [b for b in diagram.bifurcations if b.kind is cf.Kind.BP]
+    settings = settings_of(event.orbit, "vb", diagram.range, None, True, 100)
+    crossing = crossing_near(event.orbit, settings, LOCATED)
+    assert crossing is not None
+    for distance in (1e-2, 1e-3, 1e-4):
+        curves = []
+        for direction in crossing.directions:
+            arms = [
+                leave_along(crossing.orbit, settings, way, distance)
+                for way in (direction, direction.reversed())
+            ]
+            orbits = [arm.point.orbit(crossing.orbit, 0) for arm in arms if arm is not None]
+            assert len(orbits) == 2
+            curves.append(
+                [{i for i, b in enumerate(diagram.branches) if on_branch(o, b)} for o in orbits]
+            )
+        assert all(one == other and len(one) == 1 for one, other in curves), distance
+        assert curves[0] != curves[1], distance

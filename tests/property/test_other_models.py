@@ -11,6 +11,7 @@ import restarts
 from report import Tally
 
 import contfric as cf
+from contfric.atlas.matching import inner_orbit, on_branch
 
 FILES = Path(__file__).parents[1] / "models"
 #: Models whose scenes take up to a minute.
@@ -116,3 +117,19 @@ def test_random_scenes_of_models_that_bundled_studies_explore(first: int) -> Non
         restarts.one_scene(tally, found, most=2, branches=40, max_periods=models.PERIODS)
     assert tally.counts.get("scenes", 0) >= 2
     assert tally.failed == []
+
+
+@pytest.mark.parametrize("seed", range(2, 7))
+def test_a_branch_is_known_where_its_middle_is_not_solved_again(seed: int) -> None:
+    """Half of the points of this doubled branch crowd next to a touch, where Newton's method leaves 1e-9."""
+    rng = np.random.default_rng([50, seed])
+    params = {"A": 0.8217, "C": 0.83373 * (1.0 + rng.uniform(-0.02, 0.02))}
+    step = float(rng.uniform(0.005, 0.03))
+    orbit = cf.find_orbit(FILES / "switched.yaml", params, longest=1000)
+    diagram = cf.explore(orbit, "A", (0.5375, 1.02695), max_periods=2, max_step=step)
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        assert on_branch(inner_orbit(branch), branch)
+        start = branch[len(branch) // 3]
+        again = cf.explore(start, "A", diagram.range, max_periods=2, max_step=step)
+        assert sorted(b.system.periods for b in again.branches) == [1, 2]
