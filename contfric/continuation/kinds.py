@@ -22,8 +22,8 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
 entry      after a reset the state is on another  CS: another mode follows; GS where what just passes or
            surface                                 turns back is mapped again
 lasting    slide between two holds                 GS: the first can be left no more
-any        of a state of one of many contacts      as the exit by which it begins: AS of a slip, GS of a
-           that vanishes (:func:`beginning_of`)    stick
+any        of a segment that vanishes between two  as the exit by which it begins: AS of a slip, GS of a
+           of one mode (:func:`beginning_of`)      stick
 =========  ======================================  ==========================================
 
 For CS and SS the sign of the observable's rate at the stop decides: rest is left if the state moves
@@ -51,9 +51,9 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.system import EventFunction, Margin, System, inside_sign
 from contfric.signature.holds import ends_rest
 
-#: A slide after a hold that is this short has vanished where one of its margins has: they are its length
-#: times a rate of the load, and Newton may fail before they are below 1e-5.
-_VANISHED = 1e-3
+#: A segment that is this short (in periods) has vanished where one of its margins has: they are its length
+#: times a rate, and Newton may fail before they are below 1e-5.
+_VANISHED = 1e-4
 #: A load that changes this slowly at a stop, against how fast it may, stands still there: a stop at a minimum
 #: is known to the root of rounding. Where it is faster, a stick as short as its rate still ends in a jump.
 ROUNDED = 1e-6
@@ -95,17 +95,17 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
 
 
 def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:
-    """Return the segment before one without length, after which a contact is as before it; else None.
+    """Return the segment before one without length, after which motion goes on as before it; else None.
 
-    Where many contacts are and nothing jumps. All margins of such a segment vanish together, and which of
-    them is met first is rounding: the event is what its beginning is.
+    Where nothing jumps. All margins of such a segment vanish together, and which of them is met first is
+    rounding: the event is what its beginning is.
     """
     k, itinerary = test.segment, orbit.itinerary
-    if not (orbit.model.composed and orbit.model.filippov) or len(itinerary) < 3:
+    if not orbit.model.filippov or len(itinerary) < 3:
         return None
     before, behind = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
-    vanished = bool(orbit.durations[k] < _VANISHED)
+    vanished = bool(orbit.durations[k] < _VANISHED * orbit.period)
     return (k - 1) % len(itinerary) if same and vanished else None
 
 
@@ -123,7 +123,7 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
         behind = (hold.segment + 1) % len(orbit.system.itinerary)
         if test.segment == behind and test.margin is not Margin.JOINT:
             duration = orbit.durations[behind]
-            if duration < _VANISHED:
+            if duration < _VANISHED * orbit.period:
                 return hold
     return None
 

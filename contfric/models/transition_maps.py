@@ -152,17 +152,28 @@ class TransitionMaps(ChatterMaps):
                     self.domain_by_name[d]
                     for d in self.targets.get((domain.name, surface.name), ())
                 ]
+                mapped = self.maps_at(domain, surface.name)
                 for target in found:
-                    key = tuple(target.signs[s.name] for s in self.surfaces)
-                    behind = self._domains_by_signs[key]
+                    behind = self._domains_by_signs[self._chosen_at(domain, surface, target)]
                     fits = {d.mode for d in nearest(behind, domain.own_mode, self._side_of)}
                     fits |= {d.mode for d in behind if d.mode == domain.mode}
                     named = {d.own_mode for d in found if d.signs == target.signs}
-                    mapped = self.maps_at(domain, surface.name)
                     several = len(named) > 1 if mapped else len(fits) > 1
                     if several and not (not mapped and domain.mode in fits):
                         yield domain, surface.name, tuple(sorted(named if mapped else fits))
                         break
+
+    def _chosen_at(self, domain: Domain, surface: Surface, target: Domain) -> tuple[int, ...]:
+        """Return the sides at which it is chosen in which mode motion goes on.
+
+        Motion that turns back at a surface has entered a mode behind it.
+        """
+        if not surface.switching and domain.own_mode != target.own_mode:
+            through = {**domain.signs, surface.name: -domain.signs[surface.name]}
+            beyond = self.domain_at(through, domain.own_mode)
+            if beyond is not None and self.domain_by_name[beyond].own_mode == target.own_mode:
+                target = self.domain_by_name[beyond]
+        return tuple(target.signs[s.name] for s in self.surfaces)
 
     def maps_at(self, domain: Domain, surface: str) -> bool:
         """Return whether a reset acts on motion that meets a surface.

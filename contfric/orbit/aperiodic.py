@@ -196,3 +196,13 @@ def moves_on(trajectory: Trajectory) -> bool:
     before, after = (flow.state(whole, time, state, d) for d in (_LATER, math.e * _LATER))
     moves = min(float(np.max(np.abs(y - state))) for y in (before, after))
     return moves > _APART * (1.0 + float(np.max(np.abs(state))))
+
+
+def stays(trajectory: Trajectory) -> str:
+    """Return what is said of a solution that stays on a surface for ever: where, if it comes to a point."""
+    model, (_, _, state, mode) = trajectory.model, trajectory.last
+    where = ""
+    if model.autonomous and np.all(np.isfinite(state)) and not moves_on(trajectory):
+        place = ", ".join(f"{s} = {v:.4g}" for s, v in zip(model.states, state, strict=True))
+        where = f", at its pseudo-equilibrium {place}"
+    return f"the solution stays in mode '{model.whole_mode(mode)}' for ever{where}: nothing releases it"

@@ -20,6 +20,7 @@ from contfric.orbit.aperiodic import (
     left_region,
     moves_on,
     out_of_range,
+    stays,
     why_none,
 )
 from contfric.orbit.clock import clocked
@@ -255,8 +256,7 @@ def _check_motion(trajectory: Trajectory) -> None:
     if trajectory.end not in (SimulationEnd.EVENTS, SimulationEnd.TIME):
         why, mode = trajectory.end.value, trajectory.last[3]
         if trajectory.end is SimulationEnd.HELD and mode:
-            held = trajectory.model.whole_mode(mode)
-            why = f"the solution stays in mode '{held}' for ever: nothing releases it"
+            why = stays(trajectory)
         missing = trajectory.end is SimulationEnd.IMPOSSIBLE
         if missing and (rest := trajectory.model.chatter_by_mode.get(mode)):
             raise ConvergenceError(

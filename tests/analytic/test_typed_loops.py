@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
+from contfric.continuation.kinds import kind_of_margin
 
 #: Two modes of a string, and friction that falls with the speed of sliding (Smith and Woodhouse 2000).
 BOW = """
@@ -101,3 +103,42 @@ def test_a_limit_that_another_surface_divides(tmp_path: Path) -> None:
     caught = typed(tmp_path, LIMITED.replace(", sliding: filippov", ""))
     with pytest.raises(cf.ConvergenceError, match="has left the region of 'bottom_free' at 'hi'"):
         cf.find_orbit(caught)
+
+
+def test_what_vanishes_is_named_alike_by_all_its_margins(tmp_path: Path) -> None:
+    """Which margin of a segment without length is met first is rounding.
+
+    A slide that vanishes has been a graze of its surface (GS), and what vanishes between two slides a touch
+    of their end (AS). Margins said CS, SS, or the other of the two; at w = 0.412576935572 so did the diagram.
+    """
+    model, rng, named = typed(tmp_path, LIMITED), np.random.default_rng(5), Counter[cf.Kind]()
+    drawn = [(0.41, {}), *((0.4, own) for own in _some_limits(rng, 6))]
+    for w, own in drawn:
+        orbit = cf.find_orbit(model, params={"w": w, **own})
+        branches = cf.explore(orbit, "w", (0.35, 0.6), max_branches=8).branches
+        again = [cf.continue_orbit(b[len(b) // 2], "w", (0.35, 0.6)) for b in branches]
+        for event in (end.bifurcation for branch in again for end in branch.ends):
+            if event is None:
+                continue
+            here = event.orbit
+            for k in np.flatnonzero(here.durations < 1e-5 * here.period):
+                before, mode, behind = (
+                    here.itinerary[(k + j) % len(here.itinerary)][0] for j in (-1, 0, 1)
+                )
+                if before != behind:
+                    continue
+                expected = cf.Kind.GS if model.mode_by_name[mode].sliding else cf.Kind.AS
+                tests = [test for test in here.system.tests if test.segment == k]
+                if not tests:  # of the other half
+                    continue
+                kinds = {kind_of_margin(here.system, test, here) for test in tests}
+                assert kinds == {expected}, (own, event)
+                named[expected] += 1
+    assert named[cf.Kind.AS] and named[cf.Kind.GS]
+    assert cf.explore(cf.find_orbit(model), "w", (0.4, 0.6)).verify().passed
+
+
+def _some_limits(rng: np.random.Generator, count: int) -> list[dict[str, float]]:
+    low, high = (1.0, 0.8, 1.5, 0.1), (3.0, 2.5, 4.0, 0.4)
+    rows = rng.uniform(low, high, (count, 4)).tolist()
+    return [dict(zip(("kp", "ki", "a", "zeta"), row, strict=True)) for row in rows]

@@ -205,5 +205,9 @@ def test_a_runner_on_a_spring(tmp_path) -> None:
 
 
 def test_what_slides_for_ever_is_called_by_its_mode(tmp_path) -> None:
-    with pytest.raises(cf.ConvergenceError, match="stays in mode 'slide' for ever"):
+    # on y = Tc prey grows as it is eaten: (1 - x/K)(1 + x) = a Tc, so that x = 1 + sqrt(0.4)
+    where = (
+        rf"for ever, at its pseudo-equilibrium x = {1.0 + math.sqrt(0.4):.4g}, y = 0\.8: nothing"
+    )
+    with pytest.raises(cf.ConvergenceError, match=f"stays in mode 'slide' {where}"):
         cf.find_orbit(typed(tmp_path, THRESHOLD), state=[1.0, 0.5])

@@ -1,4 +1,4 @@
-"""Two switches with hysteresis each: of modes that overlap, the one in which a single switch has changed."""
+"""Modes that overlap: of two switches a single one changes; else which mode follows has to be said."""
 
 from __future__ import annotations
 
@@ -46,3 +46,34 @@ def test_one_of_two_switches_changes(tmp_path: Path, seed: int) -> None:
     for (mode, surface), after in zip(motion.itinerary, names[1:], strict=False):
         changed = [k for k in (0, 1) if mode[1 + k] != after[1 + k]]
         assert changed == [int(surface[-1]) - 1], (mode, surface, after)
+
+
+def gated(seed: int) -> tuple[str, str]:
+    """Return a file in which two modes hold behind a surface, in either of which motion may turn back."""
+    rng = np.random.default_rng(seed)
+    rates = {mode: float(rng.uniform(0.2, 1.0) * rng.choice([-1, 1])) for mode in ("up", "down")}
+    named = str(rng.choice(["up", "down"]))
+    modes = [
+        "  low: {in: {big: -}, field: {x: -x, y: 1 + cos(t)/9}}\n",
+        f"  up: {{in: {{left: +}}, field: {{x: -1, y: {rates['up']!r}}}}}\n",
+        f"  down: {{in: {{right: -}}, field: {{x: 1, y: {rates['down']!r}}}}}\n",
+    ]
+    order = rng.permutation(3)
+    return (
+        f"name: gated\nstates: [x, y]\nparameters: {{c: {float(rng.uniform(0.2, 0.8))!r}}}\nperiod: 2*pi\n"
+        "surfaces:\n  big: {observable: y, level: c}\n"
+        "  left: {observable: x, level: -1}\n  right: {observable: x, level: 1}\n"
+        f"modes:\n{''.join(modes[i] for i in order)}"
+        "resets:\n  left: {to: [low, down], from: [up]}\n  right: {to: [low, up], from: [down]}\n"
+    ), named
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_which_of_two_modes_follows_has_to_be_said(tmp_path: Path, seed: int) -> None:
+    """Where the one that came first in the file turned back it was chosen without a word."""
+    text, named = gated(seed)
+    with pytest.raises(cf.ModelError, match=r"meets 'big' in 'low.*' could go on in down or up"):
+        typed(tmp_path, text)
+    model = typed(tmp_path, f"{text}  big: {{to: {named}, from: [low]}}\n")
+    motion = cf.simulate(model, state=[0.0, 0.0], domain="low:x0", periods=1, events=2)
+    assert [model.whole_mode(mode) for mode, _ in motion.itinerary] == ["low", named]
