@@ -93,8 +93,7 @@ class Model(Shown, TransitionMaps):
         ``spread(params)`` returns the half-width of the region that starts are drawn from,
         shape (n,), nondimensional.
     ranges : callable or None
-        ``ranges(params)`` returns the lowest and highest value of each state, shape (n, 2), no numbers for
-        a state that has no range; None where none has.
+        ``ranges(params)`` returns the lowest and highest value of each state, shape (n, 2), NaN without one.
     resets : tuple of Reset
         Surfaces at which the state is mapped.
     chatters : tuple of Chatter
@@ -106,25 +105,22 @@ class Model(Shown, TransitionMaps):
         Observables at whose zeros the fields have kinks and no jumps: no joints, labels or events
         (:mod:`contfric.flow.kinked`).
     filippov : bool
-        Whether rest is left without acceleration everywhere (static and kinetic limit agree), so that the
-        flow never jumps: slides may then shrink to nothing, and are solved for accordingly.
+        Whether rest is left without acceleration everywhere (static and kinetic limit agree): slides may then
+        shrink to nothing.
     turned : frozenset of (str, str)
-        (mode, surface): motion that enters the mode where it meets the surface turns back to the side that it
-        came from, as a room does when its heater is switched off.
+        (mode, surface): motion that enters the mode where it meets the surface turns back, as a room does
+        when its heater is switched off.
     turned_at_times : frozenset of (str, str)
         The same, where it turns back from some states and goes on from others.
     max_step : float or None
-        Largest step of a continuation, as a share of the range, where the user gives none; None for that
-        of the engine. For a model whose branches fold in less.
+        Largest step of a continuation, as a share of the range; None for that of the engine.
     rounding : float
-        Relative rounding of its motion, the floor of what Newton's method can reach: that of integrated
-        flows with large accelerations by default; a closed form has less.
+        Relative rounding of its motion, the floor of what Newton's method can reach; that of integration.
     displacement : str
         The displacement as an observable, where it may have extrema inside of segments; empty where they
         are at joints, as they are with a joint wherever the mass stops.
     phase : str
-        The surface of the excitation's phase that divides modes in which an orbit may stay: a joint of orbits
-        that meet no other surface, and no label (:mod:`contfric.models.phases`); empty without one.
+        The surface of the phase that divides modes in which orbits may stay (:mod:`contfric.models.phases`).
     quantities : tuple of (str, str)
         Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
     ball_factory : callable or None
@@ -133,7 +129,7 @@ class Model(Shown, TransitionMaps):
     units : tuple of (str, float)
         The unit of each state, and of the time ``t``, that has one: results are numbers in these units.
     origins : tuple of (str, str)
-        What a state is measured from, an expression of the parameters, where a symmetry shifts it.
+        What states are measured from that a symmetry shifts, expressions of parameters.
     definition : str
         Text from which the model can be built; empty if it is known by its name only.
 
