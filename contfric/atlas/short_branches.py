@@ -24,6 +24,7 @@ from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, where
 from contfric.atlas.matching import same_event, same_kind, same_location
+from contfric.base.interrupts import whole
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.candidates import Candidate
@@ -82,7 +83,7 @@ class _Parabola:
 
     def first_end(self) -> tuple[int, float] | None:
         """Return the margin that vanishes first, and where; None if none does so near."""
-        from scipy.optimize import brentq
+        brentq = whole("scipy.optimize").brentq
 
         farthest = nearest(self.orbit)
         here, there = self.orbit.margins, self.at(farthest).margins

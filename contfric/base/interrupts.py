@@ -12,6 +12,8 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
+from importlib import import_module
 from types import FrameType
 from typing import Any
 
@@ -58,3 +60,16 @@ def _exchanged(handler: Any) -> Any:
 def _restore(before: Any) -> None:
     if before is not None:
         signal.signal(signal.SIGINT, before)
+
+
+@cache
+def whole(package: str) -> Any:
+    """Return a package, all of which is imported: Ctrl-C waits until it is.
+
+    Examples
+    --------
+    >>> round(whole("scipy.optimize").brentq(lambda x: x * x - 2.0, 1.0, 2.0), 6)
+    1.414214
+    """
+    with held_back():
+        return import_module(package)

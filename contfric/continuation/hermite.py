@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.side import first_point
 from contfric.models.definition import FloatArray
@@ -52,7 +53,7 @@ def zero_between(
 
     The value has different signs at both ends; the location is found by Brent's method.
     """
-    from scipy.optimize import brentq
+    brentq = whole("scipy.optimize").brentq
 
     def point_at(share: float) -> Point:
         if share in (0.0, 1.0):

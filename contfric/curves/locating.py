@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.base.tally import tally
 from contfric.continuation.hermite import cubic_between
 from contfric.continuation.locate_change import sought_of
@@ -54,7 +55,7 @@ def locate_zero(
 
     By Brent's method. A trial that is not solved counts as beyond the location, and so does the far end.
     """
-    from scipy.optimize import brentq
+    brentq = whole("scipy.optimize").brentq
 
     first, last = value(a), value(b)
     sign = float(np.sign(first)) or 1.0

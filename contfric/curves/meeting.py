@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.continuation.points import Point
 from contfric.curves.points import first_curve_point, solve_point
 from contfric.curves.problem import Problem
@@ -90,7 +91,7 @@ def _of_exit(problem: Problem, exit_: EventFunction) -> Problem:
 
 def with_multiplier(own: Problem, near: Orbit, sign: float) -> Point | None:
     """Return the point of a margin's curve at which orbits have a multiplier, by the secant method."""
-    from scipy.optimize import root_scalar
+    root_scalar = whole("scipy.optimize").root_scalar
 
     first = first_curve_point(own, near)
     if first is None:

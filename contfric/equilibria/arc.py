@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.equilibria.regions import ModeRegion
 from contfric.models.definition import FloatArray
 
@@ -143,7 +144,7 @@ class Arc:
 
         At a branch point the equations are singular: the nearest point at which they are not stands for it.
         """
-        from scipy.optimize import brentq
+        brentq = whole("scipy.optimize").brentq
 
         chord = after.x - before.x
         length = float(np.linalg.norm(chord))

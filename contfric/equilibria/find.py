@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.equilibria.newton import Zeros
 from contfric.equilibria.regions import ModeRegion, check_no_excitation, regions_of, scale_of
 from contfric.equilibria.result import (
@@ -254,7 +255,7 @@ def set_of_plane(zeros: Zeros, y: FloatArray, directions: FloatArray) -> Equilib
     The state is that of the largest ball (Chebyshev centre) in the region, a linear program where heights are
     affine.
     """
-    from scipy.optimize import linprog
+    linprog = whole("scipy.optimize").linprog
 
     region, p = zeros.region, zeros.p
     heights, names = region.heights, region.heights.names

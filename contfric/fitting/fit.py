@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.base.named import Named
 from contfric.chaos.running import Progress, check_executor
 from contfric.errors import (
@@ -240,7 +241,7 @@ class _Problem:
 
     def search(self, start: FloatArray) -> tuple[bool, str]:
         """Minimise the sum of squares; return whether that is done, and how it ended."""
-        from scipy.optimize import least_squares
+        least_squares = whole("scipy.optimize").least_squares
 
         try:
             found = least_squares(

@@ -117,8 +117,7 @@ class Model(Shown, TransitionMaps):
     rounding : float
         Relative rounding of its motion, the floor of what Newton's method can reach; that of integration.
     displacement : str
-        The displacement as an observable, where it may have extrema inside of segments; empty where they
-        are at joints, as they are with a joint wherever the mass stops.
+        The displacement as an observable, where it may have extrema inside of segments; else empty.
     phase : str
         The surface of the phase that divides modes in which orbits may stay (:mod:`contfric.models.phases`).
     quantities : tuple of (str, str)

@@ -19,6 +19,7 @@ from functools import cache
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.models.definition import FloatArray, Model
 from contfric.orbit.conserved import conserved, sampled_states
 from contfric.orbit.system import Itinerary
@@ -119,7 +120,7 @@ def _of_one_sign(columns: FloatArray) -> FloatArray:
         return np.maximum(column, 0.0) / np.sum(np.maximum(column, 0.0)) if one_sign else none
     if not columns.size or np.max(np.abs(columns)) <= _ZERO:
         return none
-    from scipy.optimize import linprog
+    linprog = whole("scipy.optimize").linprog
 
     found = linprog(
         np.zeros(columns.shape[1]),

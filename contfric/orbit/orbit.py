@@ -367,14 +367,8 @@ class Orbit(MeasuredOrbit):
     def certify(self, *, time_limit: float | None = None) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).
 
-        Parameters
-        ----------
-        time_limit : seconds (hundreds of segments take minutes) after which what is left is undecided
-
-        Raises
-        ------
-        ParameterError
-            If proofs are not offered for the model, or the limit is no number above 0.
+        After ``time_limit`` seconds (hundreds of segments take minutes) what is left is undecided. A
+        ParameterError says where proofs are not offered, or that the limit is no number above 0.
         """
         need_flint()
         from contfric.certify.limit import latest

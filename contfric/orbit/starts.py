@@ -36,11 +36,13 @@ _SURFACES_SHOWN = 8
 def signs_at(
     model: Model, t: float, y: FloatArray, vector: FloatArray, within: float = 0.0
 ) -> dict[str, int]:
-    """Return the sign of (observable - level) for every surface at a state; 0 within a distance, and unknown."""
+    """Return the sign of (observable - level) for every surface at a state; 0 within a distance."""
     flow, signs = model.view(vector), {}
     for surface in model.surfaces:
         apart = flow.height(surface.name, t, y)
-        signs[surface.name] = int(np.sign(apart)) if abs(apart) > within else 0
+        signs[surface.name] = (
+            int(np.sign(apart)) if abs(apart) > within else 0
+        )  # also where it is no number
     return {**signs, **model.settled_sides}
 
 

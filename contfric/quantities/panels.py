@@ -18,6 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.errors import ContfricError
 from contfric.models.definition import FloatArray, Model
 from contfric.quantities.duals import Dual, Kinks
@@ -337,7 +338,7 @@ def _change(found: Resolved, shares: FloatArray, arguments: list[Dual]) -> Argum
                 best = shares[j], number, shares[k]
     if best is None:
         return None
-    from scipy.optimize import brentq
+    brentq = whole("scipy.optimize").brentq
 
     low, number, high = best
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.interrupts import whole
 from contfric.chaos.running import Progress
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
@@ -202,7 +203,7 @@ class Half:
 
     def _angle(self, step: float, low: float, high: float) -> float | None:
         """Return the angle between two at which u vanishes on an arc; None if it does not, or jumps."""
-        from scipy.optimize import brentq
+        brentq = whole("scipy.optimize").brentq
 
         def departure_at(angle: float) -> float:
             found = self.section.departure(self._point(step, angle))
