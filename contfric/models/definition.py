@@ -108,8 +108,8 @@ class Model(Shown, TransitionMaps):
         Whether rest is left without acceleration everywhere (static and kinetic limit agree): slides may then
         shrink to nothing.
     turned : frozenset of (str, str)
-        (mode, surface): motion that enters the mode where it meets the surface turns back, as a room does
-        when its heater is switched off.
+        (mode, surface): motion that enters the mode where it meets the surface turns back, as that of
+        a thermostat when its heater is switched off.
     turned_at_times : frozenset of (str, str)
         The same, where it turns back from some states and goes on from others.
     max_step : float or None

@@ -54,7 +54,7 @@ def departing_side(
 def other_departures(
     sampler: Sampler,
     domains: Sequence[Domain],
-    beside: Mapping[tuple[int, ...], str],
+    modes_at: Mapping[tuple[int, ...], str],
     found: Sequence[Departure],
 ) -> tuple[Departure, ...]:
     """Return how a surface is passed between modes that do not slide there, though others do.
@@ -65,21 +65,21 @@ def other_departures(
 
     Parameters
     ----------
-    beside : the mode of each combination of sides
+    modes_at : the mode at each combination of sides
     found : departures beyond the limits of sliding
     """
     slides = [(on, d) for d in domains for on, side in d.signs.items() if side == 0]
 
     def pair_at(on: str, signs: Mapping[str, int]) -> dict[int, str]:
         keys = {side: tuple({**signs, on: side}.values()) for side in (1, -1)}
-        return {side: beside[key] for side, key in keys.items() if key in beside}
+        return {side: modes_at[key] for side, key in keys.items() if key in modes_at}
 
     sliding = [(on, pair_at(on, domain.signs)) for on, domain in slides]
     more: dict[tuple[int, ...], Departure] = {}
     for on, domain in itertools.product(dict.fromkeys(on for on, _ in slides), domains):
         signs = {**domain.signs, on: 0}
         key, pair = tuple(signs.values()), pair_at(on, signs)
-        if key in beside or key in more or len({*pair.values()}) < 2 or (on, pair) in sliding:
+        if key in modes_at or key in more or len({*pair.values()}) < 2 or (on, pair) in sliding:
             continue
         side = departing_side(sampler, pair, on, signs)
         first = next((d for d in found if _holds(d, signs)), None)
