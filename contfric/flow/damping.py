@@ -31,9 +31,19 @@ _SHORT, _TERMS = 1.0, 20
 
 
 @helper
-def plain_convolutions(zeta, d):  # type: ignore[no-untyped-def]
-    """Return G*G with its first and second derivative by d, by its closed form."""
+def responses(p, third, d):  # type: ignore[no-untyped-def]
+    """Return G, G', and P of the first and third harmonic; 0 of the third where it is not heard."""
+    zeta, w = p[ZETA], p[OMEGA]
     g, c, _ = free(zeta, d)
+    one, three = forced(zeta, w, 0.0, d), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if third != 0.0:
+        three = forced(zeta, 3.0 * w, 0.0, d)
+    return g, c, complex(one[0], -one[2]), complex(three[0], -three[2])
+
+
+@helper
+def plain_convolutions(zeta, g, c, d):  # type: ignore[no-untyped-def]
+    """Return G*G with its first and second derivative by d, by its closed form."""
     g2 = (g - d * (c + zeta * g)) / (2.0 * (1.0 - zeta) * (1.0 + zeta))
     g2_1 = 0.5 * d * g - zeta * g2
     return g2, g2_1, g - 2.0 * zeta * g2_1 - g2
@@ -86,16 +96,22 @@ def short_response(zeta, w, load, v0, first, third, d):  # type: ignore[no-untyp
 
 
 @allocating_helper
-def damping_response(p, load, v0, first, third, d):  # type: ignore[no-untyped-def]
-    """Return d(x, v)/dzeta; ``first`` and ``third`` are complex amplitudes of the harmonics at the start."""
-    zeta, w = p[ZETA], p[OMEGA]
+def damping_response(p, load, v0, first, third, d, known):  # type: ignore[no-untyped-def]
+    """Return d(x, v)/dzeta.
+
+    Parameters
+    ----------
+    first, third : complex amplitudes of the harmonics at the start
+    known : of :func:`responses`; who has them for the slide itself need not ask for them again
+    """
+    zeta, w, (g, c, p1, p3) = p[ZETA], p[OMEGA], known
     if is_short(zeta, w, third, d):
         return short_response(zeta, w, load, v0, first, third, d)
     plain = (
         abs(zeta) < 1.0 and d * d * (1.0 - zeta * zeta) >= _LONG * _LONG and is_plain(zeta, w, d)
     )
     if plain:
-        g2, g2_1, g2_2 = plain_convolutions(zeta, d)
+        g2, g2_1, g2_2 = plain_convolutions(zeta, g, c, d)
         q = complex(0.0, 0.0)
     else:
         g2, g2_1, g2_2, q = convolutions(zeta, w, d)
@@ -106,8 +122,7 @@ def damping_response(p, load, v0, first, third, d):  # type: ignore[no-untyped-d
         if turn != 0.0:
             node = complex(0.0, k * w)
             if plain and is_plain(zeta, k * w, d):
-                moved = forced(zeta, k * w, 0.0, d)
-                rest = complex(moved[0], -moved[2]) - g2_1 - (2.0 * zeta + node) * g2
+                rest = (p1 if k == 1 else p3) - g2_1 - (2.0 * zeta + node) * g2
                 q = rest / complex(1.0 - (k * w) ** 2, 2.0 * zeta * k * w)
             elif k == 3 or plain:
                 q = convolutions(zeta, k * w, d)[3]

@@ -41,6 +41,7 @@ from contfric.flow.motion import (
     S,
     direction,
     excitation,
+    harmonic,
     phases,
     point,
 )
@@ -55,17 +56,21 @@ AWAY = 1e-6
 
 
 @allocating_helper
-def damping_slope(s, p, t0, x0, v0, d):  # type: ignore[no-untyped-def]
-    """Return d(x, v)/dzeta."""
-    one, three = p[OMEGA] * t0, 3 * p[OMEGA] * t0
-    first = complex(math.cos(one), math.sin(one))
-    third = p[H] * complex(math.cos(three), math.sin(three))
-    return damping_response(p, x0 + s * p[S], v0, first, third, d)
+def damping_slope(s, p, t0, x0, v0, d, own, one, three):  # type: ignore[no-untyped-def]
+    """Return d(x, v)/dzeta, from the responses to both harmonics: those of phase 0 are turned back."""
+    theta = p[OMEGA] * t0
+    first, third = complex(math.cos(theta), math.sin(theta)), complex(0.0, 0.0)
+    p1, p3 = first.conjugate() * complex(one[0], -one[2]), third
+    if p[H] != 0.0:
+        turn = complex(math.cos(3 * theta), math.sin(3 * theta))
+        third, p3 = p[H] * turn, turn.conjugate() * complex(three[0], -three[2])
+    known = own[0], own[1], p1, p3
+    return damping_response(p, x0 + s * p[S], v0, first, third, d, known)
 
 
 @allocating_helper
-def parameter_slope(index, s, p, t0, x0, v0, d, g, r, one, three):  # type: ignore[no-untyped-def]
-    """Return d(x, v) by one parameter after a slide: from G, R and the responses to both harmonics."""
+def parameter_slope(index, s, p, t0, x0, v0, d, own, one, three):  # type: ignore[no-untyped-def]
+    """Return d(x, v) by one parameter after a slide: from (G, C, R) and the responses to both harmonics."""
     h = p[H]
     if index == OMEGA:
         x = t0 * one[2] + one[4]
@@ -75,13 +80,16 @@ def parameter_slope(index, s, p, t0, x0, v0, d, g, r, one, three):  # type: igno
             v += 3 * h * (t0 * three[3] + three[5])
         return x, v
     if index == S:
-        return -s * r, -s * g
+        return -s * own[2], -s * own[0]
     if index == H:
-        if h == 0.0:
-            three = forced(p[ZETA], 3 * p[OMEGA], 3 * p[OMEGA] * t0, d)
+        w = 3 * p[OMEGA]
+        if h == 0.0 and p[ZETA] == 0.0:
+            three = harmonic(w, math.sin(w * t0), math.cos(w * t0), d)
+        elif h == 0.0:
+            three = forced(p[ZETA], w, w * t0, d)
         return three[0], three[1]
     if index == ZETA:
-        return damping_slope(s, p, t0, x0, v0, d)
+        return damping_slope(s, p, t0, x0, v0, d, own, one, three)
     return 0.0, 0.0
 
 
@@ -102,7 +110,8 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
         y1[0], y1[1] = moved[0], moved[1]
         return
     w, h, zeta = p[OMEGA], p[H], p[ZETA]
-    g, c, r = free(zeta, dt)
+    own = free(zeta, dt)
+    g, c, r = own
     load = x0 + s * p[S]
     one = forced(zeta, w, w * t0, dt)
     x = x0 + v0 * g - load * r + one[0]
@@ -125,7 +134,7 @@ def flow(mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no-untyped-def]
     jac[1, 3] = excitation(p, t0 + dt)[0] - 2 * zeta * v - x - s * p[S]
     for k in range(which.shape[0]):
         jac[0, 4 + k], jac[1, 4 + k] = parameter_slope(
-            which[k], s, p, t0, x0, v0, dt, g, r, one, three
+            which[k], s, p, t0, x0, v0, dt, own, one, three
         )
 
 

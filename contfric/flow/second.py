@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from contfric.compiled import allocating_helper, kernel, second_signature
-from contfric.flow.damping import damping_response
+from contfric.flow.damping import damping_response, responses
 from contfric.flow.motion import OMEGA, SPEED, STICK, ZETA, H, S, direction, excitation, slide
 from contfric.flow.response import forced, free
 
@@ -61,9 +61,10 @@ def damping_column(p, s, t0, y0, d, along, v, out):  # type: ignore[no-untyped-d
     one, three = w * t0, 3.0 * w * t0
     first = complex(math.cos(one), math.sin(one))
     third = p[H] * complex(math.cos(three), math.sin(three))
-    x, y = damping_response(p, y0[0] + s * p[S], y0[1], first, third, d)
+    known = responses(p, third, d)
+    x, y = damping_response(p, y0[0] + s * p[S], y0[1], first, third, d, known)
     first, third = 1j * w * tau * first, 3j * w * tau * third
-    moved = damping_response(p, along[1], along[2], first, third, d)
+    moved = damping_response(p, along[1], along[2], first, third, d, known)
     out[0] = moved[0] + delta * y
     out[1] = moved[1] + delta * (-2.0 * v - 2.0 * p[ZETA] * y - x)
 

@@ -159,7 +159,7 @@ def _named(names: tuple[str, ...], slopes: FloatArray) -> dict[str, float]:
 def _events(orbit: Orbit) -> tuple[str, ...]:
     """Return the margins that vanish: orbits of the signature exist on one side only."""
     vanish = np.abs(orbit.margins) < _AT_EVENT
-    if not vanish.any():
+    if not np.count_nonzero(vanish):
         return ()
     tests = orbit.system.tests
     return tuple(

@@ -312,27 +312,31 @@ def sample_at_once(course, layout, i, d_period, own, data):  # type: ignore[no-u
 
 
 @helper
-def left_over(column, size):  # type: ignore[no-untyped-def]
+def left_over(column, size, enough):  # type: ignore[no-untyped-def]
     """Return the largest of the last two coefficients of a series, and what Gauss' formula misses; by size.
 
-    Infinite where something is no number.
+    Infinite where something is no number. The second is no larger than the first, which is returned for it
+    where that is small enough.
 
     That formula is exact to twice the degree. What it misses is of the size of the coefficients from there
     on, if coefficients, in pairs, go on to fall at least as slowly as they did over the last four pairs.
     """
     top, a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(NODES):  # sums next to each other: each alone would wait for its own last term
-        value = column[k]
-        top = max(top, abs(value))
-        a += _LAST[k, 0] * value
-        b += _LAST[k, 1] * value
-        c += _LAST[k, 2] * value
-        d += _LAST[k, 3] * value
-        e += _LAST[k, 4] * value
-        f += _LAST[k, 5] * value
-        g += _LAST[k, 6] * value
-        h += _LAST[k, 7] * value
-    if not math.isfinite(a):  # what is no number is in all sums
+    for k in range(NODES // 2):  # polynomials are even or odd, as their degree is
+        value, mirrored = column[k], column[NODES - 1 - k]
+        top = max(top, abs(value), abs(mirrored))
+        even, odd = value + mirrored, value - mirrored
+        a += (
+            _LAST[k, 0] * even
+        )  # sums next to each other: each alone would wait for its own last term
+        b += _LAST[k, 1] * odd
+        c += _LAST[k, 2] * even
+        d += _LAST[k, 3] * odd
+        e += _LAST[k, 4] * even
+        f += _LAST[k, 5] * odd
+        g += _LAST[k, 6] * even
+        h += _LAST[k, 7] * odd
+    if not math.isfinite(a + b):  # what is no number is in all sums
         return np.inf, np.inf
     one, two, three, four = (
         max(abs(a), abs(b)),
@@ -341,8 +345,8 @@ def left_over(column, size):  # type: ignore[no-untyped-def]
         max(abs(g), abs(h)),
     )
     own = max(top, size, 1e-300)
-    if four == 0.0:
-        return 0.0, 0.0
+    if four <= enough * own:
+        return four / own, four / own
     fall = max(
         four / max(three, four), math.sqrt(four / max(two, four)), (four / max(one, four)) ** _THIRD
     )
@@ -350,14 +354,14 @@ def left_over(column, size):  # type: ignore[no-untyped-def]
 
 
 @helper
-def noise_of(data, sizes):  # type: ignore[no-untyped-def]
+def noise_of(data, sizes, enough):  # type: ignore[no-untyped-def]
     """Return the largest of what is left over in a part, see :func:`left_over`; sizes grow to those there."""
     left, missed = 0.0, 0.0
     for j in range(data.shape[0]):
         for k in range(NODES):
             sizes[j] = max(sizes[j], abs(data[j, k, 0]))
         for c in range(data.shape[2]):
-            tail, beyond = left_over(data[j, :, c], sizes[j])
+            tail, beyond = left_over(data[j, :, c], sizes[j], max(enough, missed))
             left, missed = max(left, tail), max(missed, beyond)
     return left, missed
 
@@ -368,8 +372,10 @@ def resolved(data, waiting, before, level):  # type: ignore[no-untyped-def]
 
     ``before`` is where what was left over of the whole stands, of which it is a half.
     """
-    left, missed = noise_of(data, waiting[SIZES:])
     rounding = ROUNDING if before == LIGHT else _SUMMED
+    left, missed = noise_of(data, waiting[SIZES:], level)
+    if left > level:  # what Gauss' formula misses matters only then
+        left, missed = noise_of(data, waiting[SIZES:], 0.5 * rounding)
     noise = waiting[DEPTH] >= HALVED and FALLS * waiting[before] < left < NOISE
     return left, left <= level or noise or (left < NOISE and missed < rounding)
 

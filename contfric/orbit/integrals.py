@@ -49,13 +49,15 @@ from contfric.orbit.integral_parts import (
 )
 from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn
 from contfric.orbit.peak import Extreme, ExtremeType
-from contfric.orbit.system import IntArray
-from contfric.quantities.motion import goes_on
+from contfric.quantities.motion import Directions, goes_on
 from contfric.quantities.panels import DEEPEST, RESOLVED, ROUNDING, resolved_level
 from contfric.quantities.tape import Tape
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
+
+#: The parameters that move, and how, where nothing does.
+_STILL = np.empty(0, dtype=np.int64), np.empty((0, 0))
 
 
 @helper
@@ -232,41 +234,92 @@ def integrate(  # type: ignore[no-untyped-def]
     return True
 
 
+@kernel(
+    types.void(
+        *(FlowType, LayoutType, vector, i8, f8, blocks, matrix, blocks, indices, matrix, matrix)
+    )
+)
+def follow_directions(  # type: ignore[no-untyped-def]
+    functions,
+    layout,
+    p,
+    turns,
+    by_period,
+    on_joints,
+    by_parameters,
+    joints,
+    which,
+    moved,
+    out,
+):
+    """Write how integrals move in D directions, and as the last row how the period of the orbit does.
+
+    Parameters
+    ----------
+    turns : 2 for a symmetric orbit, solved on its half, 1 otherwise
+    by_period : how the extra parameter moves with the period of the orbit, as the rate of waves does
+    on_joints, by_parameters : the gradients, of :func:`integrate`
+    joints : how the joints move, shape (N, m, D)
+    which, moved : the parameters that move, and how, shape (len(which), D)
+    out : shape (L + 1, D)
+    """
+    last, free = out.shape[0] - 1, which.shape[0]
+    grad = np.zeros(free)
+    if layout.turn != 0.0:
+        functions.period(p, which, grad)
+    for d in range(out.shape[1]):
+        turn = -joints[0, 0, d] if layout.turn == 0.0 else 0.0  # a cycle ends at time 0
+        for k in range(free):
+            turn += layout.turn * grad[k] * moved[k, d]
+        out[last, d] = turns * turn
+        for j in range(last):
+            value = by_parameters[j, free] * by_period * out[last, d]
+            for k in range(free):
+                value += by_parameters[j, k] * moved[k, d]
+            for i in range(joints.shape[0]):
+                for k in range(joints.shape[1]):
+                    value += on_joints[j, i, k] * joints[i, k, d]
+            out[j, d] = value
+
+
 class Integrals(NamedTuple):
-    """Integrals over an orbit; gradients are empty where they were not asked for.
+    """Integrals over an orbit, with their derivatives in D directions.
 
     Attributes
     ----------
     values : shape (L,)
-    on_joints : by the joints of one turn, shape (L, N, m)
-    on_parameters : by the parameters that move and the extra one, shape (L, moving + 1)
+    slopes : how they move, and as the last row how the period of the orbit does, shape (L + 1, D)
     """
 
-    values: FloatArray
-    on_joints: FloatArray
-    on_parameters: FloatArray
+    values: list[float]
+    slopes: FloatArray
 
 
 def integrals_of(
-    orbit: Orbit, tape: Tape, extra: float, moving: IntArray | None
+    orbit: Orbit, tape: Tape, rate: float, directions: Directions | None
 ) -> Integrals | None:
     """Return what :meth:`contfric.Orbit.integrals` does."""
     system, joints, model = orbit.system, np.ascontiguousarray(orbit.joints), orbit.model
-    count, rows = len(tape.outputs), 0 if moving is None else len(tape.outputs)
-    which = np.empty(0, dtype=np.int64) if moving is None else moving
-    found = Integrals(
-        np.empty(count), np.empty((rows, *joints.shape)), np.empty((rows, len(which) + 1))
-    )
+    count, rows = len(tape.outputs), 0 if directions is None else len(tape.outputs)
+    which, moved = _STILL if directions is None else directions.moving
+    found = np.empty(count), np.empty((rows, *joints.shape)), np.empty((rows, len(which) + 1))
     whole = Extreme(-1, 0, 1.0, orbit.as_whole().system.layout)
-    at = joints, orbit.vector, which, extra
+    at = joints, orbit.vector, which, rate
     engine = system.functions(), system.layout, whole, tape
-    if goes_on(model) and _carried(orbit, tape, engine, at, found):
-        return found
-    done = integrate(*engine, *at, resolved_level(model), int(goes_on(model)), *found)
-    return found if done and math.isfinite(sum(found.values.tolist())) else None
+    if not (goes_on(model) and _carried(orbit, tape, engine, at, found)) and not integrate(
+        *engine, *at, resolved_level(model), int(goes_on(model)), *found
+    ):
+        return None
+    slopes = np.empty((count + 1, moved.shape[1]))
+    if directions is not None:
+        turns, by_period = 1 + system.half, -rate / orbit.period
+        along = np.ascontiguousarray(directions.joints), which, moved
+        follow_directions(*engine[:2], orbit.vector, turns, by_period, *found[1:], *along, slopes)
+    values: list[float] = found[0].tolist()
+    return Integrals(values, slopes) if math.isfinite(sum(values)) else None
 
 
-def _carried(orbit: Orbit, tape: Tape, engine: Any, at: Any, found: Integrals) -> bool:
+def _carried(orbit: Orbit, tape: Tape, engine: Any, at: Any, found: Any) -> bool:
     """Carry the integrals along as states, where that is the way; tell whether they were found so."""
     from contfric.orbit.carried import carried_by, carry
 

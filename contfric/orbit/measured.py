@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
     from contfric.orbit.resting_positions import RestingPosition
     from contfric.orbit.slides import Outline
-    from contfric.orbit.system import IntArray
+    from contfric.quantities.motion import Directions
     from contfric.quantities.registry import QuantityLike
     from contfric.quantities.tape import Tape
 
@@ -79,8 +79,8 @@ class MeasuredOrbit(Shown):
 
         return extreme_with_derivatives(cast("Orbit", self), observable, inside, sign)
 
-    def integrals(self, tape: Tape, extra: float, moving: IntArray | None) -> Integrals | None:
-        """Return integrals of expressions over the orbit, with their gradients by joints and parameters.
+    def integrals(self, tape: Tape, rate: float, directions: Directions | None) -> Integrals | None:
+        """Return integrals of expressions over the orbit, with their derivatives in some directions.
 
         None where an expression has a kink inside of a segment, or nothing resolves it: it is then measured
         by :mod:`contfric.quantities.panels`.
@@ -88,12 +88,12 @@ class MeasuredOrbit(Shown):
         Parameters
         ----------
         tape : the expressions
-        extra : the parameter that follows those of the model
-        moving : the parameters that move; None where no gradients are wanted
+        rate : of the waves in them, so many in the period of the orbit; 0 without waves
+        directions : how the orbit moves; None where no derivatives are wanted
         """
         from contfric.orbit.integrals import integrals_of
 
-        return integrals_of(cast("Orbit", self), tape, extra, moving)
+        return integrals_of(cast("Orbit", self), tape, rate, directions)
 
     def quantity(self, name: QuantityLike) -> Any:
         """Return a quantity: by its name, as an expression, or as a function of an orbit.

@@ -74,9 +74,9 @@ def _in_one_pass(
     values, slopes = found
     at = 0
     for each in group:
-        rows = slice(at, at + (2 if each[1] else 1))
+        rows = range(at, at + (2 if each[1] else 1))
         at = rows.stop
-        yield each, (values[rows], slopes[rows])
+        yield each, (values[rows.start : at], slopes[[*rows, -1]])
 
 
 def _functionals(quantity: Quantity) -> list[Functional]:

@@ -42,7 +42,7 @@ _STEPS = 2
 #: Shares over which the bend is a difference: the root of rounding of a rate, and less in a boundary layer.
 _WIDTHS = (1e-4, 1e-6, 1e-8)
 
-#: Integrals over an orbit, with their derivatives, shape (L, D).
+#: Integrals over an orbit, with their derivatives, shape (L + 1, D): those of its period are the last row.
 Totals = tuple[list[float], FloatArray]
 #: What is integrated: for which functional, and the rate of its waves, 0 without them.
 Asked = tuple[Functional, float]
@@ -81,11 +81,12 @@ class Measuring:
         """Return a functional that is made of integrals, with its derivatives, shape (D,)."""
         if asked.kind in ("amplitude", "phase"):
             return self._harmonic(asked)
-        (total,), (slopes,) = self._compiled(asked) or self._on_panels(asked)
+        (total,), (slopes, d_lasts) = self._compiled(asked) or self._on_panels(asked)
         if asked.kind == "integral":
             return total, slopes
         lasts = self._period
-        mean, slopes = total / lasts, (slopes - total / lasts * self.motion.d_period) / lasts
+        mean = total / lasts
+        slopes = (slopes - mean * d_lasts) / lasts
         if asked.kind == "mean":
             return mean, slopes
         root = math.sqrt(mean)
@@ -116,7 +117,8 @@ class Measuring:
             cycles = self._cycles(asked)
             functions = [_turning(function, self.motion, cycles, wave) for wave in ("cos", "sin")]
         found = [self._on_panel(asked, each) for each in functions]
-        return [value for value, _ in found], np.array([slopes for _, slopes in found])
+        slopes = [*(slopes for _, slopes in found), self.motion.d_period]
+        return [value for value, _ in found], np.array(slopes)
 
     def _compiled(self, asked: Functional, rate: float = 0.0) -> Totals | None:
         """Return what is integrated for a functional by compiled code; None where it leaves it to panels.
@@ -140,20 +142,9 @@ class Measuring:
 
     def integrals(self, tape: Tape, rate: float) -> Totals | None:
         """Return integrals by compiled code; None where it leaves them to panels."""
-        orbit, directions = self.motion.orbit, self.motion.directions
-        which = None if directions is None else directions.moving[0]
-        found = orbit.integrals(tape, rate, which)
-        if found is None:
-            return None
-        values = found.values.tolist()
-        if directions is None:
-            return values, np.empty((len(values), 0))
-        by_joints = found.on_joints.reshape(len(values), -1)
-        slopes = by_joints @ directions.joints.reshape(-1, self.motion.count)
-        slopes += found.on_parameters[:, :-1] @ directions.moving[1]
-        if rate:
-            slopes -= found.on_parameters[:, -1:] * (rate / self._period * self.motion.d_period)
-        return (values, slopes) if math.isfinite(float(slopes.sum())) else None
+        found = self.motion.orbit.integrals(tape, rate, self.motion.directions)
+        finite = found is not None and math.isfinite(sum(found.slopes.ravel().tolist()))
+        return found if finite else None
 
     def _work(self, asked: Functional) -> Dual:
         """Return what a contact dissipates in a period of the orbit: where it slides, and at impacts."""
@@ -185,10 +176,10 @@ class Measuring:
         a, b = scale * totals[0], -scale * totals[1]
         size = math.hypot(a, b)
         if asked.kind == "phase":
-            turned = np.array((-b * scale, -a * scale)) @ slopes
+            turned = np.array((-b * scale, -a * scale, 0.0)).dot(slopes)
             return math.atan2(b, a), _over(turned, size**2)
-        grown = np.array((a * scale, -b * scale)) @ slopes
-        return size, _over(grown - size * size / self._period * self.motion.d_period, size)
+        grown = np.array((a * scale, -b * scale, -size * size / self._period)).dot(slopes)
+        return size, _over(grown, size)
 
     def _cycles(self, asked: Functional) -> int:
         """Return the number of waves of a harmonic in the period of the orbit.
