@@ -130,7 +130,7 @@ def ensemble(
     model.index_of(parameter)
     bounds = checked_range(parameter, range)
     varied = checked_distributions(model, distributions, parameter)
-    row = number_quantity(row, model, "an ensemble").asked
+    quantity = number_quantity(row, model, "an ensemble")
     count = whole_number("samples", 1000 if samples is None else samples, least=1)
     grid = _values(parameter, bounds, values)
     must_fit(f"an ensemble of {count} diagrams at {len(grid)} values", count * len(grid) * _BYTES)
@@ -142,11 +142,14 @@ def ensemble(
     vectors = np.tile(vector, (count, 1))
     vectors[:, [model.index_of(name) for name in varied.names]] = drawn
     side = whole_number("tile", tile, least=1)
-    whole = EnsembleTile(model, vectors, parameter, bounds, row, grid, options)
+    kept = quantity.function or quantity.name  # not a function's name: tiles depend on its code
+    whole = EnsembleTile(model, vectors, parameter, bounds, kept, grid, options)
     with kept_in(folder):
         rows = _computed(whole, side, executor, progress)
     texts = dict(zip(varied.names, varied.texts, strict=True))
-    return Ensemble(model, parameter, bounds, vector, row, grid, texts, seed, drawn, rows)
+    return Ensemble(
+        model, parameter, bounds, vector, quantity.asked, grid, texts, seed, drawn, rows
+    )
 
 
 def _options(

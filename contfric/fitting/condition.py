@@ -23,6 +23,7 @@ from contfric.models.definition import FloatArray, Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
+from contfric.quantities.registry import quantity_of
 from contfric.remember.journal import remembered
 
 Datum: TypeAlias = Measured | Series | Jump
@@ -177,7 +178,16 @@ def conditions_of(
         own = (k,) if isinstance(datum, Jump) else ()
         values = sorted((str(name), float(value)) for name, value in datum.params.items())
         groups.setdefault((*own, *values), []).append(k)
+    asked = [_with_function(datum, model) for datum in data]
     return [
-        (FitCondition(model, tuple(data[k] for k in numbers), free), numbers)
+        (FitCondition(model, tuple(asked[k] for k in numbers), free), numbers)
         for numbers in groups.values()
     ]
+
+
+def _with_function(datum: Datum, model: Model) -> Datum:
+    """Return a datum with the function itself that it names: what is kept of it depends on its code."""
+    if not isinstance(datum, Measured):
+        return datum
+    function = quantity_of(datum.quantity, model).function
+    return datum if function is None else replace(datum, quantity=function)

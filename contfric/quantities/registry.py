@@ -9,7 +9,9 @@ other processes ask for it by that.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from importlib import import_module
@@ -134,7 +136,12 @@ def quantity_of(asked: QuantityLike, model: Model) -> Quantity:
     'x_max'
     """
     if isinstance(asked, str):
-        return _quantity_of(asked.strip(), model)
+        text = asked.strip()
+        if _IMPORTABLE.fullmatch(
+            text
+        ):  # looked up each time: its module may have been loaded again
+            return Quantity(text, model, None, _imported(text))
+        return _quantity_of(text, model)
     if callable(asked):
         return Quantity(name_of(asked), model, None, asked)
     raise ParameterError(
@@ -229,6 +236,19 @@ def _imported(name: str) -> Callable[[Orbit], Any]:
     return found
 
 
+def functions_in(tree: Any) -> Iterator[Callable[[Orbit], Any]]:
+    """Yield the functions that texts in lists and mappings name, of modules that have been imported."""
+    if isinstance(tree, Mapping):
+        tree = list(tree.values())
+    if isinstance(tree, list | tuple):
+        for each in tree:
+            yield from functions_in(each)
+    elif isinstance(tree, str) and _IMPORTABLE.fullmatch(tree):
+        loaded = tree.partition(":")[0] in sys.modules
+        with suppress(ParameterError):
+            yield from [_imported(tree)] if loaded else []
+
+
 def _import_name(function: Callable[[Orbit], Any]) -> str:
     """Return the name that a function can be imported by, in other processes too; empty if it has none."""
     module = getattr(function, "__module__", None) or ""
@@ -243,8 +263,6 @@ def _import_name(function: Callable[[Orbit], Any]) -> str:
 
 @lru_cache(maxsize=512)
 def _quantity_of(text: str, model: Model) -> Quantity:
-    if _IMPORTABLE.fullmatch(text):
-        return Quantity(text, model, None, _imported(text))
     named = NAMED.get(text)
     if named is not None and named.several:
         return Quantity(text, model, None)

@@ -29,6 +29,7 @@ from contfric.base.files import unwritable
 from contfric.base.sources import package_digest
 from contfric.base.tally import add, tally
 from contfric.errors import ContfricError, ResultFileError
+from contfric.remember.questions import Question
 from contfric.remember.stored import Reader, UnstorableError, Writer
 
 P = ParamSpec("P")
@@ -321,7 +322,7 @@ class Parts:
 
 def _question(name: str, asked: Any) -> tuple[bytes, Writer]:
     """Return the key of a call, and the writer that has the objects in it."""
-    inputs = Writer()
+    inputs = Question()
     return digest_of(inputs.bytes_of([name, asked])), inputs
 
 

@@ -14,8 +14,10 @@ from pathlib import Path
 
 from contfric.base.resources import user_cache
 from contfric.errors import ContfricError, ResultFileError
+from contfric.quantities.registry import functions_in
 from contfric.remember.journal import Journal, belongs, digest_of, keeping, program
-from contfric.remember.stored import UnstorableError, Writer
+from contfric.remember.questions import Question
+from contfric.remember.stored import UnstorableError
 from contfric.study.read import Study
 
 #: The journal, in the folder of the run.
@@ -28,7 +30,10 @@ def key_of(study: Study) -> str:
     """Return a digest of everything that a study computes from, and of the program."""
     asked = json.dumps(study.as_dict(), sort_keys=True, default=str)
     try:
-        started = Writer().bytes_of((study.model, study.params, study.signature, study.orbit))
+        functions = list(functions_in(study.as_dict()))
+        started = Question().bytes_of(
+            (study.model, study.params, study.signature, study.orbit, functions)
+        )
     except UnstorableError:
         started = repr((study.model.name, study.params, study.signature, study.orbit)).encode()
     return digest_of(asked.encode() + started + program().encode()).hex()
