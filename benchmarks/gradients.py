@@ -37,61 +37,61 @@ CASES: dict[str, tuple[str, str, dict[str, float], str, tuple[float, float]]] = 
 }
 
 
-def seconds(call: Callable[[], Any]) -> float:
-    """Return how long a call takes, in time of the processor: the least of some in a row."""
+def seconds(call: Callable[[cf.Orbit], Any], orbit: cf.Orbit) -> float:
+    """Return how long a call takes, in time of the processor: the least of some in a row.
+
+    Each is handed a copy of the orbit, of which nothing but what its solve leaves is known.
+    """
     found = []
     for _ in range(REPEATS):
+        fresh = copy(orbit)
         start = time.process_time()
-        call()
+        call(fresh)
         found.append(time.process_time() - start)
     return min(found)
 
 
-def calls(name: str) -> dict[str, Callable[[], Any]]:
-    """Return what is timed for a case: find_orbit first, whose orbit the others are asked of."""
+def calls(name: str) -> tuple[cf.Orbit, dict[str, Callable[[cf.Orbit], Any]]]:
+    """Return the orbit of a case, and what is timed of it, the solve first."""
     model, signature, params, parameter, limits = CASES[name]
-    loaded, found = cf.load_model(model), [cf.find_orbit(model, params)]
-
-    def find() -> None:
-        found[0] = cf.find_orbit(loaded, params)
-
-    def fresh() -> cf.Orbit:
-        return copy(found[0])
-
-    timed: dict[str, Callable[[], Any]] = {"find_orbit": find}
+    loaded, found = cf.load_model(model), cf.find_orbit(model, params)
+    timed: dict[str, Callable[[cf.Orbit], Any]] = {
+        "find_orbit": lambda _: cf.find_orbit(loaded, params)
+    }
     if signature:
-        timed["the user's call"] = lambda: cf.solve_orbit(model, signature, params)
-    moved = found[0].vector.copy()
+        timed["the user's call"] = lambda _: cf.solve_orbit(model, signature, params)
+    moved = found.vector.copy()
     moved[0] *= 1.001
-    timed["Newton's method"] = lambda: refine(replace(found[0], vector=moved))
+    timed["Newton's method"] = lambda orbit: refine(replace(orbit, vector=moved))
     if parameter:
-        timed["a branch"] = lambda: cf.continue_orbit(found[0], parameter, limits)
-    timed["orbit"] = lambda: by_parameters(fresh())
+        timed["a branch"] = lambda orbit: cf.continue_orbit(orbit, parameter, limits)
+    timed["orbit"] = by_parameters
     x, v = loaded.states[:2]
     asked = [text.format(x=x, v=v) for text in QUANTITIES]
     asked = [text for text in asked if text in cf.quantity_names(model) or "(" in text]
     for quantity in asked:
-        timed[f"{quantity}, value"] = lambda q=quantity: fresh().quantity(q)
-        timed[f"{quantity}, gradient"] = lambda q=quantity: fresh().gradient(q)
+        timed[f"{quantity}, value"] = lambda orbit, q=quantity: orbit.quantity(q)
+        timed[f"{quantity}, gradient"] = lambda orbit, q=quantity: orbit.gradient(q)
 
-    def several() -> None:
-        orbit = fresh()
+    def several(orbit: cf.Orbit) -> None:
         for quantity in asked:
             orbit.gradient(quantity)
 
     timed["several, gradient"] = several
-    timed["at once, gradients"] = lambda: fresh().gradients(asked)
-    return timed
+    timed["at once, gradients"] = lambda orbit: orbit.gradients(asked)
+    return found, timed
 
 
 def main() -> None:
     """Print times and ratios."""
     for name in CASES:
-        timed = calls(name)
-        points = len(timed["a branch"]()) if "a branch" in timed else 1
+        orbit, timed = calls(name)
+        points = len(timed["a branch"](orbit)) if "a branch" in timed else 1
         for call in timed.values():
-            call()
-        rounds = [{what: seconds(call) for what, call in timed.items()} for _ in range(ROUNDS)]
+            call(copy(orbit))
+        rounds = [
+            {what: seconds(call, orbit) for what, call in timed.items()} for _ in range(ROUNDS)
+        ]
         for each in rounds:
             each["a branch"] = each.get("a branch", 0.0) / points
         solves = [what for what in SOLVES if what in timed]
