@@ -51,7 +51,7 @@ class Assembly:
         """The same by their segments."""
         return {hold.segment: hold for hold in self.holds}
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """The surfaces of the model: of one whose modes come as they are visited those until now."""
         return [surface.name for surface in self.model.surfaces]
@@ -186,15 +186,17 @@ class Assembly:
         model = self.model
         if self.domains or model.composed:  # what bounds no mode has no side there
             return
+        own = [
+            [s.name for s in model.surfaces if s.observable == o.name] for o in model.observables
+        ]
         for i, (mode, exit_) in enumerate(self.itinerary):
             if model.mode_by_name[mode].sliding:
                 continue
             end = self.held[i + 1].pin if i + 1 in self.held else exit_
-            for c, observable in enumerate(model.observables):
-                own = [s.name for s in model.surfaces if s.observable == observable.name]
-                if any(s != model.phase and inside_sign(model, mode, s) == 0 for s in own):
-                    start = self._begins_on(i, own)
-                    yield i, c, *(model.surface_index[s] if s in own else -1 for s in (start, end))
+            for c, of in enumerate(own):
+                if any(s != model.phase and inside_sign(model, mode, s) == 0 for s in of):
+                    ends = self._begins_on(i, of), end
+                    yield i, c, *(model.surface_index[s] if s in of else -1 for s in ends)
 
     def _begins_on(self, i: int, own: list[str]) -> str | None:
         """Return the surface of some that a segment begins on after a reset; else that of its entry."""
