@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import CurveStep
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
 from contfric.curves.ranges import PlaneRanges
@@ -182,7 +182,7 @@ def _resonances(held: OnCircle, points: list[Point]) -> list[SpecialPoint]:
             def beyond(point: Point, angle: float = angle) -> float:
                 return _angle_at(held, point) - angle
 
-            point, fine = locate_zero(held, a, b, held.border, beyond)
+            point, fine = CurveStep(held, a, b, held.border).zero_of(beyond)
             if fine and point is not a and min(held.inside(point)) >= 0.0:
                 found.append(_special(kind, held.orbit_of(point), point.arc - points[0].arc))
     return found
