@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar
 
-from contfric.errors import NotationError
+from contfric.errors import ContfricError, NotationError
 
 if TYPE_CHECKING:
     import yaml
 
+T = TypeVar("T")
 #: Where an entry is: keys and list indices from the top.
 Address: TypeAlias = tuple[str | int, ...]
 #: Largest file, and most entries in it: a model or a study has a few hundred. (Reading takes a second then.)
@@ -44,6 +46,13 @@ class LocatedYaml:
     def fail(self, address: Address, message: str) -> NoReturn:
         """Raise the error ``file.yaml:LINE: message``."""
         raise NotationError(f"{self.path}:{self.line(address)}: {message}")
+
+    def attempt(self, address: Address, step: Callable[[], T]) -> T:
+        """Return what a step returns, of which an error of the input belongs to an entry of the file."""
+        try:
+            return step()
+        except ContfricError as error:
+            self.fail(address, str(error))
 
 
 def read_yaml(path: Path) -> LocatedYaml:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from contfric.base.renamed import renamed
-from contfric.base.shown import Shown
+from contfric.base.shown import Shown, aligned
 from contfric.base.tabled import as_table
 from contfric.censuses.conditions import ClosedItinerary, Fate
 from contfric.models.definition import Model
@@ -175,10 +175,7 @@ class Census(Shown):
             rows.append(
                 [orbit.name, *texts, stability_of(orbit), multipliers, str(orbit.signature)]
             )
-        widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
-        return "\n".join(
-            "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows
-        )
+        return "\n".join(aligned(rows))
 
     def __str__(self) -> str:
         where = ", ".join(f"{k} = {v:g}" for k, v in self.params.items())

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from contfric.base.interrupts import held_back
 from contfric.continuation.points import Point
 from contfric.models.definition import FloatArray
-from contfric.orbit.linear import linearised, null_space
+from contfric.orbit.linear import linearised, null_space, stacked
 from contfric.orbit.orbit import Orbit
 
 #: Units of rounding in one equation of a segment: its phases, its duration and its state have some each.
@@ -81,10 +81,7 @@ def _weights(
     try:
         if size <= _FULL:
             full = np.zeros((size + 1, size + 1))
-            for i in range(count):
-                rows, following = slice(i * m, (i + 1) * m), (i + 1) % count * m
-                full[rows, rows] += a[i]
-                full[rows, following : following + m] += b[i]
+            full[:size, :size] = stacked(a, b, np.eye(m))  # the last block is closed already
             full[:size, size], full[size] = c.ravel(), row
             return np.asarray(np.linalg.solve(full.T, wanted), dtype=np.float64)
         return _sparse_weights(a, b, c, row, wanted)

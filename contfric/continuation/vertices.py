@@ -18,7 +18,8 @@ from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.linear import null_vectors
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import crossings_near, in_halves, is_smooth
+from contfric.orbit.section_crossings import crossings_near
+from contfric.orbit.sections import in_halves, is_smooth
 from contfric.orbit.system import System, build_system
 
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.

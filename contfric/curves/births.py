@@ -15,7 +15,7 @@ import numpy as np
 from contfric.continuation.events import Kind
 from contfric.continuation.points import Point
 from contfric.continuation.vertices import passed_vertex, symmetrised, undoubled
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import CurveStep
 from contfric.curves.meeting import with_multiplier
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
@@ -38,16 +38,15 @@ def birth_among(problem: Problem, chain: list[Point]) -> int | None:
     return None if passed is None or not np.isfinite(passed[1]) else passed[0]
 
 
-def birth_between(
-    problem: Problem, before: Point, after: Point, border: FloatArray
-) -> tuple[Point, SpecialPoint]:
+def birth_between(step: CurveStep[Problem]) -> tuple[Point, SpecialPoint]:
     """Return the last point of a fold curve between two, and what it is: DBP, or GPD of doubled orbits."""
-    reference = _odd_part(problem, before)
+    problem = step.problem
+    reference = _odd_part(problem, step.before)
 
     def value(p: Point) -> float:
         return float(np.sum(_odd_part(problem, p) * reference))
 
-    point, fine = locate_zero(problem, before, after, border, value)
+    point, fine = step.zero_of(value)
     orbit = problem.orbit(point.joints, point.w)
     symmetric = problem.system.periods % 2 == 1 or orbit.mirror_distance < 1e-5
     kind = CodimTwo.DBP if symmetric else CodimTwo.GPD

@@ -45,8 +45,6 @@ from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated, of_orbit, of_orbits
 from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 
-#: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
-_STEP = 6e-6
 #: Calls for one point after which secants are given up for differences: three or four are enough.
 _SECANTS = 6
 #: Derivatives this small (per width) are those of a point that is found: the next one begins.
@@ -133,7 +131,7 @@ class Stationary(Held):
             return Defects(np.zeros_like(values), known.rows)  # what is left is their error
         known.calls += 1
         if known.rows is None or known.calls > _SECANTS:
-            known.rows, known.calls = self._differences(x, orbit), 0
+            known.rows, known.calls = self.differences(orbit, self.slopes), 0
         elif known.x is not None and known.values is not None and np.any(x != known.x):
             step = x - known.x
             missed = values - known.values - known.rows @ step
@@ -147,16 +145,6 @@ class Stationary(Held):
     def _blurred(self) -> bool:
         """Whether the slopes are differences, of a user's function: good to 1e-10, and not to rounding."""
         return self.quantity is not None and self.quantity.function is not None
-
-    def _differences(self, x: FloatArray, orbit: Orbit) -> FloatArray:
-        """Return rows with the slopes of the conditions in the tangent plane of the orbits."""
-        plane = self.in_plane(orbit)[:, 1:]
-        slopes = [
-            (self.slopes(self.at(x + _STEP * c)) - self.slopes(self.at(x - _STEP * c)))
-            / (2 * _STEP)
-            for c in plane.T
-        ]
-        return np.asarray(np.array(slopes).T @ plane.T)
 
 
 def continue_extremum(

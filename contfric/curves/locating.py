@@ -7,7 +7,8 @@ them; its watched value decides on which side the location is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from contfric.continuation.hermite import cubic_between
 from contfric.continuation.locate_change import sought_of
 from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import Conditioned, compiled_problem, solve_point
-from contfric.curves.problem import Problem
 from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
@@ -36,88 +36,92 @@ _SHORTER = 0.38
 _SAME_LOCATION = 1e-10
 
 Value = Callable[[Point], float]
+P = TypeVar("P", bound=Conditioned)
 
 
-def point_between(
-    problem: Conditioned, a: Point, b: Point, x: float, border: FloatArray
-) -> Point | None:
-    """Return the solved point at a share of a step."""
-    point = solve_point(problem, *cubic_between(a, b, x), border.copy())
-    if point is not None:
-        point.arc = a.arc + x * (b.arc - a.arc)
-    return point
+@dataclass(frozen=True, eq=False)
+class CurveStep(Generic[P]):
+    """A step of a curve in which something may change its sign.
 
-
-def locate_zero(
-    problem: Conditioned, a: Point, b: Point, border: FloatArray, value: Value
-) -> tuple[Point, bool]:
-    """Return the location where a value changes sign, and whether it is bracketed to its last digits.
-
-    By Brent's method. A trial that is not solved counts as beyond the location, and so does the far end.
+    Attributes
+    ----------
+    problem : what the curve follows
+    before, after : the solved points at its ends
+    border : that of the first, shape (2, N, m)
     """
-    brentq = whole("scipy.optimize").brentq
 
-    first, last = value(a), value(b)
-    sign = float(np.sign(first)) or 1.0
-    best, left, lost = a, abs(first), False
+    problem: P
+    before: Point
+    after: Point
+    border: FloatArray
 
-    def value_at(x: float) -> float:
-        nonlocal best, left, lost
-        if x in (0.0, 1.0):
-            return first if x == 0.0 else -sign * max(-sign * last, _NOISE)
-        point = point_between(problem, a, b, x, border)
-        f = -sign if point is None else value(point)
-        f = f if np.isfinite(f) else sign
-        if f * sign <= 0.0:
-            lost = point is None
-        if point is not None and (abs(f) < left or f * sign >= 0.0):
-            best, left = point, abs(f)
-        return 0.0 if abs(f) <= _NOISE else f
+    def point_at(self, share: float) -> Point | None:
+        """Return the solved point at a share of the step."""
+        a, b = self.before, self.after
+        point = solve_point(self.problem, *cubic_between(a, b, share), self.border.copy())
+        if point is not None:
+            point.arc = a.arc + share * (b.arc - a.arc)
+        return point
 
-    if first != 0.0:
-        brentq(value_at, 0.0, 1.0, xtol=_RESOLUTION, rtol=4.0 * _ROUNDING)
-    return best, not lost and left < 1e-6
+    def zero_of(self, value: Value) -> tuple[Point, bool]:
+        """Return the location where a value changes sign, and whether it is bracketed to its last digits.
 
+        By Brent's method. A trial that is not solved counts as beyond the location, and so does the far end.
+        """
+        brentq = whole("scipy.optimize").brentq
 
-def locate(
-    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
-) -> tuple[Point, bool]:
-    """Return the location of a change, and whether it is bracketed to its last digits; compiled."""
-    from contfric.curves.bracket import locate_on_curve
+        first, last = value(self.before), value(self.after)
+        sign = float(np.sign(first)) or 1.0
+        best, left, lost = self.before, abs(first), False
 
-    rows = PointRows.empty(problem.system, 4, 2)
-    rows.put(0, a)
-    rows.put(1, b)
-    compiled = compiled_problem(problem)
-    status, _ = locate_on_curve(compiled, border.copy(), sought, rows.arrays(), tally())
-    return (a, False) if status < 0 else (rows.point(3), status == 1)
+        def value_at(x: float) -> float:
+            nonlocal best, left, lost
+            if x in (0.0, 1.0):
+                return first if x == 0.0 else -sign * max(-sign * last, _NOISE)
+            point = self.point_at(x)
+            f = -sign if point is None else value(point)
+            f = f if np.isfinite(f) else sign
+            if f * sign <= 0.0:
+                lost = point is None
+            if point is not None and (abs(f) < left or f * sign >= 0.0):
+                best, left = point, abs(f)
+            return 0.0 if abs(f) <= _NOISE else f
 
+        if first != 0.0:
+            brentq(value_at, 0.0, 1.0, xtol=_RESOLUTION, rtol=4.0 * _ROUNDING)
+        return best, not lost and left < 1e-6
 
-def locate_twice(
-    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought
-) -> tuple[Point, bool]:
-    """Return the location of a change, and whether another bracket finds it at the same parameters."""
-    point, fine = locate(problem, a, b, border, sought)
-    return point, fine and found_again(problem, a, b, border, sought, point)
+    def located(self, sought: Sought) -> tuple[Point, bool]:
+        """Return the location of a change, and whether it is bracketed to its last digits; compiled."""
+        from contfric.curves.bracket import locate_on_curve
 
+        rows = PointRows.empty(self.problem.system, 4, 2)
+        rows.put(0, self.before)
+        rows.put(1, self.after)
+        compiled = compiled_problem(self.problem)
+        status, _ = locate_on_curve(compiled, self.border.copy(), sought, rows.arrays(), tally())
+        return (self.before, False) if status < 0 else (rows.point(3), status == 1)
 
-def found_again(
-    problem: Problem, a: Point, b: Point, border: FloatArray, sought: Sought, point: Point
-) -> bool:
-    """Tell whether another bracket finds a location at the same parameters.
+    def located_twice(self, sought: Sought) -> tuple[Point, bool]:
+        """Return the location of a change, and whether another bracket finds it at the same parameters."""
+        point, fine = self.located(sought)
+        return point, fine and self.found_again(sought, point)
 
-    Where another curve of the same condition passes through, or conditions degenerate, Newton's method is
-    singular: each bracket closes to its last digits, and each somewhere else.
-    """
-    if not a.arc < point.arc < b.arc:
-        return True
-    share = _SHORTER * (point.arc - a.arc) / (b.arc - a.arc)
-    start = point_between(problem, a, b, share, border)
-    if start is None:
-        return False
-    again, fine = locate(problem, start, b, border, sought)
-    gap = float(np.max(np.abs(again.w - point.w) / problem.box.widths))
-    return fine and gap < _SAME_LOCATION
+    def found_again(self, sought: Sought, point: Point) -> bool:
+        """Tell whether another bracket finds a location at the same parameters.
+
+        Where another curve of the same condition passes through, or conditions degenerate, Newton's method is
+        singular: each bracket closes to its last digits, and each somewhere else.
+        """
+        a, b = self.before.arc, self.after.arc
+        if not a < point.arc < b:
+            return True
+        start = self.point_at(_SHORTER * (point.arc - a) / (b - a))
+        if start is None:
+            return False
+        again, fine = replace(self, before=start).located(sought)
+        gap = float(np.max(np.abs(again.w - point.w) / self.problem.box.widths))
+        return fine and gap < _SAME_LOCATION
 
 
 def by_test(index: int) -> Sought:

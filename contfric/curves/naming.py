@@ -11,11 +11,10 @@ from contfric.continuation.events import Kind
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import EXTRA, Point
 from contfric.curves.births import end_of_asymmetry
-from contfric.curves.locating import by_label, by_test, found_again, locate, locate_twice
+from contfric.curves.locating import CurveStep, by_label, by_test
 from contfric.curves.meeting import at_once
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
-from contfric.models.definition import FloatArray
 from contfric.orbit.system import EventFunction, Margin
 
 #: A multiplier this far from the real axis belongs to a complex pair.
@@ -40,14 +39,12 @@ class LocatedChange:
     terminal: bool
 
 
-def crossings(
-    problem: Problem, before: Point, after: Point, border: FloatArray
-) -> list[LocatedChange]:
+def crossings(step: CurveStep[Problem]) -> list[LocatedChange]:
     """Return what happens between two points, in order; the first terminal one is the last."""
     found = [
-        *_margins(problem, before, after, border),
-        *_smooth(problem, before, after, border),
-        *_labels(problem, before, after, border),
+        *_margins(step),
+        *_smooth(step),
+        *_labels(step),
     ]
     found.sort(key=lambda c: c.point.arc)
     last = next((k for k, crossing in enumerate(found) if crossing.terminal), None)
@@ -57,20 +54,18 @@ def crossings(
     return [c for c in found[: last + 1] if c.terminal or end - c.point.arc > _OF_EVENT]
 
 
-def _margins(
-    problem: Problem, before: Point, after: Point, border: FloatArray
-) -> list[LocatedChange]:
+def _margins(step: CurveStep[Problem]) -> list[LocatedChange]:
     """Return the first margin that is violated, with its group."""
-    tests = problem.system.tests
-    located = []
+    problem, after = step.problem, step.after
+    tests, located = problem.system.tests, []
     for k in np.flatnonzero(after.tests[: len(tests)] < 0.0):
         index = int(k)
-        point, fine = locate(problem, before, after, border, by_test(index))
+        point, fine = step.located(by_test(index))
         located.append((point.arc, index, point, fine))
     if not located:
         return []
     _, first, point, fine = min(located, key=lambda entry: entry[0])
-    fine = fine and found_again(problem, before, after, border, by_test(first), point)
+    fine = fine and step.found_again(by_test(first), point)
     point, fine = at_once(problem, point, fine, tests[first])
     orbit = problem.orbit(point.joints, point.w)
     kind = kind_of_margin(problem.system, tests[first], orbit)
@@ -116,10 +111,9 @@ def _special(
     return SpecialPoint(kind, name, orbit.params, orbit, meets, tests, point.arc, located)
 
 
-def _smooth(
-    problem: Problem, before: Point, after: Point, border: FloatArray
-) -> list[LocatedChange]:
+def _smooth(step: CurveStep[Problem]) -> list[LocatedChange]:
     """Return what the normal form and the multipliers tell."""
+    problem, before, after = step.problem, step.before, step.after
     base = len(before.tests) - EXTRA
     found = []
     for column in (_BEND, _ONE, _MINUS, _PAIR):
@@ -127,7 +121,7 @@ def _smooth(
         a, b = before.tests[index], after.tests[index]
         if not a * b < 0.0 or max(abs(a), abs(b)) < MARGINAL:
             continue
-        point, fine = locate_twice(problem, before, after, border, by_test(index))
+        point, fine = step.located_twice(by_test(index))
         value = abs(point.tests[index])
         if not math.isfinite(value) or value > max(0.5 * min(abs(a), abs(b)), MARGINAL):
             continue  # it changes sign through infinity: an exit that becomes tangential
@@ -167,16 +161,15 @@ def _smooth_kind(
     return (CodimTwo.SN_BP if half else CodimTwo.SN_PD), other_kind
 
 
-def _labels(
-    problem: Problem, before: Point, after: Point, border: FloatArray
-) -> list[LocatedChange]:
+def _labels(step: CurveStep[Problem]) -> list[LocatedChange]:
     """Return the tangencies that the curve meets: segments are relabelled, and the curve goes on."""
+    problem, before, after = step.problem, step.before, step.after
     rows = problem.system.layout.labels
     observables = problem.model.observables
     found = []
     for k in np.flatnonzero(before.labels != after.labels):
         old = int(before.labels[k])
-        point, _ = locate(problem, before, after, border, by_label(int(k), old))
+        point, _ = step.located(by_label(int(k), old))
         test = EventFunction(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(LocatedChange(point, special, False))

@@ -14,7 +14,7 @@ from contfric.continuation.touching import rest_at
 from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
 from contfric.models.definition import FloatArray, Model
-from contfric.orbit.linear import jacobian_blocks
+from contfric.orbit.linear import jacobian_blocks, stacked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
 from contfric.orbit.system import EventFunction, IntArray, Margin, System
@@ -274,12 +274,6 @@ def border_of(problem: Problem, joints: FloatArray, vector: FloatArray) -> Float
         return border
     a, b, _, close = jacobian_blocks(problem.system, joints, vector, parameters=False)
     count, m = joints.shape
-    full = np.zeros((count * m, count * m))
-    for i in range(count):
-        rows = slice(i * m, (i + 1) * m)
-        full[rows, rows] += a[i]
-        after = slice((i + 1) * m, (i + 2) * m) if i + 1 < count else slice(0, m)
-        full[rows, after] += b[i] if i + 1 < count else problem.condition.sign * (b[i] @ close)
-    u, _, vh = np.linalg.svd(full)
+    u, _, vh = np.linalg.svd(stacked(a, b, problem.condition.sign * close))
     border[0], border[1] = u[:, -1].reshape(count, m), vh[-1].reshape(count, m)
     return border

@@ -19,7 +19,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -47,6 +47,8 @@ _NEAR = 0.02
 #: Slopes along the orbits this small next to those by joints and parameters, which cancel, or next to the
 #: quantity itself, over the ranges: rounding. Orbits are solved to 1e-13, and a fold amplifies that.
 _STILL = 1e-10
+#: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
+_STEP = 6e-6
 
 
 class Defects(NamedTuple):
@@ -199,6 +201,15 @@ class Held:
         except np.linalg.LinAlgError as error:
             raise ConvergenceError("the orbits have no tangent plane", orbit) from error
         return np.column_stack([shortest, basis[:, rows:]])
+
+    def differences(self, orbit: Orbit, value: Callable[[Orbit], Any]) -> FloatArray:
+        """Return rows of one or more values in the tangent plane of the orbits, by central differences."""
+        x, plane = self.scaled(orbit), self.in_plane(orbit)[:, 1:]
+        slopes = [
+            (value(self.at(x + _STEP * c)) - value(self.at(x - _STEP * c))) / (2.0 * _STEP)
+            for c in plane.T
+        ]
+        return np.asarray(np.atleast_2d(np.array(slopes).T) @ plane.T)
 
     def directions(self, columns: FloatArray) -> Directions:
         """Return scaled directions, shape (N m + q, D), as solutions of joints and parameters."""

@@ -15,7 +15,7 @@ from contfric.continuation.events import EndReason
 from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import CurveStep
 from contfric.curves.points import end_of_march, march_on
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
@@ -285,7 +285,7 @@ class HeldSide:
 
         fine = True
         if least(before) > 0.0:
-            found, fine = locate_zero(self.held, before, after, self.held.border, least)
+            found, fine = CurveStep(self.held, before, after, self.held.border).zero_of(least)
             self.points += [found] if found is not before else []
         stopped = CurveEnd(CurveEndReason.STEP)
         self.end = _end_at(self.held, self.points[-1]) if fine else stopped

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.continuation.points import Point
 from contfric.curves.births import birth_between
-from contfric.curves.locating import by_location, locate
+from contfric.curves.locating import CurveStep, by_location
 from contfric.curves.naming import crossings
 from contfric.curves.problem import Problem
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
@@ -55,6 +55,10 @@ class CurveSide:
         came = next((p for p in self.points[-2::-1] if np.any(p.w != self.tip.w)), None)
         return self.tip.direction if came is None else self.tip.w - came.w
 
+    def step_to(self, after: Point) -> CurveStep[Problem]:
+        """Return the step from the tip to a point."""
+        return CurveStep(self.problem, self.tip, after, self.border)
+
     @property
     def last(self) -> CurveSide:
         """What it goes on as at its very end."""
@@ -69,7 +73,7 @@ def _beyond(problem: Problem, point: Point) -> float:
 def end_at_birth(side: CurveSide, fresh: list[Point], at: int) -> bool:
     """End a fold curve of asymmetric (doubled) orbits where they become symmetric (undoubled)."""
     side.points += fresh[:at]
-    point, special = birth_between(side.problem, side.tip, fresh[at], side.border)
+    point, special = birth_between(side.step_to(fresh[at]))
     side.points.append(point)
     side.special.append(special)
     side.end = CurveEnd(CurveEndReason.BIRTH, special=special)
@@ -78,8 +82,7 @@ def end_at_birth(side: CurveSide, fresh: list[Point], at: int) -> bool:
 
 def end_at_limit(side: CurveSide, after: Point) -> bool:
     """End a side where the model's parameters end."""
-    problem = side.problem
-    point, _ = locate(problem, side.tip, after, side.border, by_location(problem.limits))
+    point, _ = side.step_to(after).located(by_location(side.problem.limits))
     if point is not side.tip:
         side.points.append(point)
     side.end = CurveEnd(CurveEndReason.LIMIT)
@@ -94,9 +97,8 @@ def near_limit(problem: Problem, point: Point) -> CurveEnd | None:
 
 def resolve(side: CurveSide, after: Point, border: FloatArray) -> bool:
     """Locate what happened over the last step; True if the side ends there."""
-    problem, before = side.problem, side.tip
     limit = _range_crossed(side, after)
-    for crossing in crossings(problem, before, after, side.border):
+    for crossing in crossings(side.step_to(after)):
         if limit is not None and crossing.point.arc > limit.arc:
             break
         side.special.append(crossing.special)
@@ -121,5 +123,5 @@ def _range_crossed(side: CurveSide, after: Point) -> Point | None:
     inside = before.w @ box.edges[:, :2].T + box.edges[:, 2]
     if np.min(inside) <= 0.0:
         return before
-    point, _ = locate(side.problem, before, after, side.border, by_location(box.edges))
+    point, _ = side.step_to(after).located(by_location(box.edges))
     return point

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.locating import locate_zero
+from contfric.curves.locating import CurveStep
 from contfric.curves.quantity_step import Defects, Held
 from contfric.curves.quantity_trace import trace_both
 from contfric.curves.ranges import PlaneRanges
@@ -34,8 +34,6 @@ from contfric.errors import ConvergenceError, ParameterError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
-#: Step of the central differences in scaled unknowns: the cube root of rounding balances both errors, 1e-10.
-_STEP = 6e-6
 #: A multiplier this far from the unit circle does not belong to a located NS.
 _MULTIPLIER = 1e-6
 #: Angles of the strong resonances that a curve passes.
@@ -71,13 +69,8 @@ class OnCircle(Held):
 
     def defects(self, orbit: Orbit) -> Defects:
         """Return log(mu_1 mu_2) and its row."""
-        x, plane = self.scaled(orbit), self.in_plane(orbit)[:, 1:]
-        slopes = [
-            (self.defect(self.at(x + _STEP * c)) - self.defect(self.at(x - _STEP * c)))
-            / (2.0 * _STEP)
-            for c in plane.T
-        ]
-        return Defects(np.array([self.defect(orbit)]), np.array([slopes]) @ plane.T)
+        value = np.array([self.defect(orbit)])
+        return Defects(value, self.differences(orbit, self.defect))
 
     def defect(self, orbit: Orbit) -> float:
         """Return log(mu_1 mu_2) of the critical pair."""
@@ -182,7 +175,7 @@ def _resonances(held: OnCircle, points: list[Point]) -> list[SpecialPoint]:
             def beyond(point: Point, angle: float = angle) -> float:
                 return _angle_at(held, point) - angle
 
-            point, fine = locate_zero(held, a, b, held.border, beyond)
+            point, fine = CurveStep(held, a, b, held.border).zero_of(beyond)
             if fine and point is not a and min(held.inside(point)) >= 0.0:
                 found.append(_special(kind, held.orbit_of(point), point.arc - points[0].arc))
     return found

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,29 +24,15 @@ from contfric.orbit.aperiodic import (
     stays,
     why_none,
 )
-from contfric.orbit.clock import clocked
 from contfric.orbit.kept_positions import Places
-from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.repetition import shortest
-from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, creeps, is_point, winds
-from contfric.orbit.sections import is_smooth, loops, without_sections
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.recurrences import EXACT, orbit_come_to, recurrences
+from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, is_point, winds
 from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.sizes import warn_of_sizes
-from contfric.orbit.solve import centred, refine_with_symmetry
-from contfric.orbit.system import build_system
 from contfric.orbit.time_scale import clock_period, time_scale
 from contfric.remember.journal import remembered
-from contfric.signature.cyclic import primitive_length
 
-#: Most events of a cycle that is looked for: 64 periods of an orbit with 32 joints.
-_MOST_EVENTS = 2048
-#: A return nearer than this (nondimensional) is worth a Newton solve.
-_NEAR = 1e-2
-#: A return nearer than this is periodic to the resolution of a simulation.
-_EXACT = 1e-9
-#: A motion whose returns shrink by less than this from one to the next takes hundreds of periods more. Its
-#: series, and the place of its end, are those of the orbit to this share: it is still some way off.
-_SLOW, _SERIES = 0.9, 0.2
 #: A solution that returns this near and still does not converge creeps along a continuum of orbits.
 _CREEPING = 1e-5
 #: Periods to follow before the first look, and how much longer before each next one.
@@ -57,8 +44,6 @@ _MOST_EVENTS_AT_ONCE = 10_000_000
 _TURNS = 100_000
 #: Share of the time of the first half of these that the second half takes if they do not come faster.
 _STEADY = 0.5
-#: An orbit that a solution converges to attracts; beyond rounding its multipliers cannot exceed 1.
-_ATTRACTS = 1.0 + 1e-6
 
 
 def find_orbit(
@@ -118,22 +103,14 @@ def find_orbit(
     checked, time = model.check_params(params), real_number("time", time)
     places = Places(model, checked, at)
     begun = places.begin(state)
-    found = places.put(
-        _wanted(_settled(model, checked, begun, time, longest, progress=progress), periods)
-    )
+    found = simulated_orbit(model, checked, begun, time, longest, progress=progress)
+    found = places.put(_wanted(found, periods))
     warn_of_sizes(found)
     return found
 
 
-def simulated_orbit(
-    model: Model, params: dict[str, float], state: FloatArray, time: float, longest: int
-) -> Orbit:
-    """Return the orbit that the solution from a state converges to, wherever its contacts rest."""
-    return _settled(model, params, state, time, longest)
-
-
 @remembered()
-def _settled(
+def simulated_orbit(
     model: Model,
     params: dict[str, float],
     state: ArrayLike | None,
@@ -142,63 +119,116 @@ def _settled(
     *,
     progress: Callable[[str], None] | None = None,
 ) -> Orbit:
-    """Return the orbit that a solution converges to."""
-    span, done, events = _FIRST, 0, 0
-    most = MOST if longest is None else longest
-
-    def heard(text: str) -> None:
-        if progress is not None:
-            progress(f"simulating: {done} periods without an orbit, then {text}")
-
-    unit, clock = time_scale(model), clock_period(model, model.vector(params))
-
-    def simulated(events: int) -> Trajectory:
-        """Follow the solution from its start, to a time and not to an event where that is gone on with."""
-        asked = span * unit / clock
-        return simulate(
-            model, params, state=state, time=time, periods=asked, events=events, progress=heard
-        )
-
-    trajectory = simulated(_FIRST_EVENTS if model.autonomous else _TURNS)
-    if trajectory.end is SimulationEnd.EVENTS:
-        if not model.autonomous and winds(trajectory):
-            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
-        if model.autonomous and _is_steady(trajectory):
-            unit = float(trajectory.last[1] - trajectory.begin[0]) / span
-        trajectory = simulated(_MOST_EVENTS_AT_ONCE)
+    """Return the orbit that the solution from a state converges to, wherever its contacts rest."""
+    search = _Search(model, params, state, time, longest, progress)
+    trajectory = search.begin()
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
         from contfric.models.chatter import with_chatter  # which takes sympy
 
         resting = with_chatter(model)
         if resting is not None:
-            return _settled(resting, params, state, time, longest, progress=progress)
+            return simulated_orbit(resting, params, state, time, longest, progress=progress)
     while True:
         check_rest(trajectory)
         divided = _divided_by_phase(trajectory)
         if divided is not None:
-            return _settled(divided, params, state, time, longest, progress=progress)
+            return simulated_orbit(divided, params, *search.start, longest, progress=progress)
         _check_motion(trajectory)
-        done, events = done + span, events + len(trajectory)
-        if longest is None:
-            most = min(most, affordable(model, done, events))
-        orbit = _read_off(trajectory, final=done >= most)
-        if orbit is not None and model.autonomous and is_point(orbit):
-            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
+        orbit = search.orbit_of(trajectory)
         if orbit is not None:
             return orbit
-        if done >= most:
+        trajectory = search.longer(trajectory)
+
+
+@dataclass(eq=False)
+class _Search:
+    """A simulation that is made longer until its solution has come to an orbit.
+
+    Attributes
+    ----------
+    span : units of time that are simulated at once
+    done, events : units of time and events that have been simulated
+    """
+
+    model: Model
+    params: dict[str, float]
+    state: ArrayLike | None
+    time: float
+    longest: int | None
+    progress: Callable[[str], None] | None
+    span: int = _FIRST
+    done: int = 0
+    events: int = 0
+
+    def __post_init__(self) -> None:
+        self.most = MOST if self.longest is None else self.longest
+        self.unit = time_scale(self.model)
+
+    @property
+    def start(self) -> tuple[ArrayLike | None, float]:
+        """State and time from which the solution is followed."""
+        return self.state, self.time
+
+    def begin(self) -> Trajectory:
+        """Return the first stretch, in a unit of time in which something happens."""
+        autonomous = self.model.autonomous
+        trajectory = self._simulated(_FIRST_EVENTS if autonomous else _TURNS)
+        if trajectory.end is not SimulationEnd.EVENTS:
+            return trajectory
+        if not autonomous and winds(trajectory):
+            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
+        if autonomous and _is_steady(trajectory):
+            self.unit = float(trajectory.last[1] - trajectory.begin[0]) / self.span
+        return self._simulated(_MOST_EVENTS_AT_ONCE)
+
+    def _simulated(self, events: int) -> Trajectory:
+        """Follow the solution from its start, to a time and not to an event where that is gone on with."""
+        clock = clock_period(self.model, self.model.vector(self.params))
+        return simulate(
+            self.model,
+            self.params,
+            state=self.state,
+            time=self.time,
+            periods=self.span * self.unit / clock,
+            events=events,
+            progress=self._say,
+        )
+
+    def _say(self, text: str) -> None:
+        if self.progress is not None:
+            self.progress(f"simulating: {self.done} periods without an orbit, then {text}")
+
+    def orbit_of(self, trajectory: Trajectory) -> Orbit | None:
+        """Return the orbit that a trajectory has come to; None where a longer one may tell.
+
+        Raises
+        ------
+        ConvergenceError
+            If a longer one would tell nothing.
+        """
+        self.done, self.events = self.done + self.span, self.events + len(trajectory)
+        if self.longest is None:
+            self.most = min(self.most, affordable(self.model, self.done, self.events))
+        final = self.done >= self.most
+        orbit = orbit_come_to(trajectory, final)
+        if orbit is not None and self.model.autonomous and is_point(orbit):
+            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
+        if orbit is None and final:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
-            raise why_none(trajectory, done, slow, compared=longest is None)
-        if why := goes_round(trajectory, done):
+            raise why_none(trajectory, self.done, slow, compared=self.longest is None)
+        if orbit is None and (why := goes_round(trajectory, self.done)):
             raise ConvergenceError(why, trajectory)
+        return orbit
+
+    def longer(self, trajectory: Trajectory) -> Trajectory:
+        """Return what follows a trajectory; of one that creeps the one from where that leads."""
         behind = _after_creep(trajectory)
         if behind is not None:
-            time, state = behind
-            trajectory = simulated(_MOST_EVENTS_AT_ONCE)
-            continue
-        span = min(span * _LONGER, most - done)
-        heard(f"{span} more")
-        trajectory = go_on(trajectory, span * unit, heard)
+            self.time, self.state = behind
+            return self._simulated(_MOST_EVENTS_AT_ONCE)
+        self.span = min(self.span * _LONGER, self.most - self.done)
+        self._say(f"{self.span} more")
+        return go_on(trajectory, self.span * self.unit, self._say)
 
 
 def _divided_by_phase(trajectory: Trajectory) -> Model | None:
@@ -244,7 +274,7 @@ def _walls_met(trajectory: Trajectory) -> list[str]:
     """Return the walls that a solution is on where it ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
     flow = model.view(model.vector(trajectory.params))
-    size = _EXACT * (1.0 + float(np.max(np.abs(state))))
+    size = EXACT * (1.0 + float(np.max(np.abs(state))))
     walls = dict.fromkeys(reset.surface for reset in model.resets)
     return [wall for wall in walls if abs(flow.height(wall, time, state)) < size]
 
@@ -277,119 +307,3 @@ def _check_motion(trajectory: Trajectory) -> None:
             f"no periodic orbit: {why}. Choose other parameters or another start{says}",
             trajectory,
         )
-
-
-def _read_off(trajectory: Trajectory, final: bool) -> Orbit | None:
-    """Return the orbit that the end of a trajectory has converged to, if it has.
-
-    A return that is not yet exact may belong to an orbit that repels, near an attractor of longer
-    period; longer simulation tells. Only at the final look are multipliers asked instead, and where the
-    solution creeps towards the orbit as slowly as they say.
-    """
-    for lag, turns, mismatch in recurrences(trajectory):
-        if creeps(trajectory, lag):  # near an orbit of another itinerary
-            return None
-        if mismatch > _EXACT and not final:
-            return _crept_to(trajectory, lag, turns)
-        orbit = _orbit_of_lag(trajectory, lag, turns)
-        if orbit is None:
-            continue
-        solved = refine_with_symmetry(shortest(refine_with_symmetry(orbit)))
-        if solved.converged and solved.admissible and (mismatch <= _EXACT or _attracts(solved)):
-            return solved
-        if mismatch <= _EXACT and not solved.converged:
-            # the simulation repeats itself but the system is singular: one orbit of a continuum
-            return centred(
-                Orbit(orbit.system, orbit.joints, orbit.vector, mismatch, Status.CONVERGED)
-            )
-    return None
-
-
-def _crept_to(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
-    """Return the orbit that a solution approaches by a geometric series of small steps; None if it does not.
-
-    Under strong damping a displacement decays within ``2 zeta``, thousands of periods. Three returns give the
-    ratio of the series and with it the place of its end: an orbit that Newton's method finds there, and
-    that attracts, is what the solution comes to.
-    """
-    if len(trajectory) < 2 * lag + 1:
-        return None
-    a, b, c = (trajectory.states[-1 - k * lag] for k in (2, 1, 0))
-    before, step = b - a, c - b
-    ratio = float(before @ step) / float(before @ before) if np.any(before) else 0.0
-    if not _SLOW < ratio < 1.0 or not np.linalg.norm(
-        step - ratio * before
-    ) < _SERIES * np.linalg.norm(step):
-        return None
-    orbit = _orbit_of_lag(trajectory, lag, turns)
-    solved = None if orbit is None else refine_with_symmetry(shortest(refine_with_symmetry(orbit)))
-    if solved is None or not (solved.converged and solved.admissible and _attracts(solved)):
-        return None
-    left = ratio / (1.0 - ratio) * step
-    ends = np.concatenate([solved.ends[:, 1:], *_images(solved)])
-    missed = np.min(np.linalg.norm(ends - (c + left), axis=1))
-    return solved if missed < _SERIES * np.linalg.norm(left) else None
-
-
-def _images(orbit: Orbit) -> list[FloatArray]:
-    """Return the joints of the second half of an orbit that is solved on its half."""
-    symmetry = orbit.model.symmetry
-    return [] if symmetry is None else [orbit.ends[:, 1:] @ symmetry.array().T]
-
-
-def _attracts(orbit: Orbit) -> bool:
-    return bool(np.all(np.abs(orbit.multipliers) <= _ATTRACTS))
-
-
-def recurrences(trajectory: Trajectory) -> Iterator[tuple[int, int, float]]:
-    """Yield (events, periods, mismatch) of near returns of the last event, shortest first."""
-    model = trajectory.model
-    count = len(trajectory)
-    if count < 2:
-        return
-    vector = model.vector(trajectory.params)
-    period = model.view(vector).period
-    joints = np.column_stack([trajectory.modes, trajectory.exits])
-    for lag in range(1, count // 2):
-        turns = int(trajectory.cycles[-1] - trajectory.cycles[-1 - lag])
-        slip = float(trajectory.times[-1] - trajectory.times[-1 - lag])
-        if period > 0.0:
-            extra = round(slip / period)
-            turns, slip = turns + extra, slip - extra * period
-        if model.autonomous:  # any time may pass
-            turns, slip = 1, 0.0
-        if turns > MOST_PERIODS or lag > _MOST_EVENTS:
-            return
-        gap = float(np.max(np.abs(trajectory.states[-1] - trajectory.states[-1 - lag])))
-        mismatch = gap + abs(slip)
-        if turns < 1 or mismatch > _NEAR:
-            continue
-        if np.array_equal(joints[-lag:], joints[-2 * lag : -lag]):
-            yield lag, turns, mismatch
-
-
-def _orbit_of_lag(trajectory: Trajectory, lag: int, turns: int) -> Orbit | None:
-    """Return the last ``lag`` events as an unsolved orbit."""
-    model = trajectory.model
-    vector = model.vector(trajectory.params)
-    period = model.view(vector).period
-    first = len(trajectory) - 1 - lag
-    cycles = trajectory.cycles[first:-1] - trajectory.cycles[first]
-    joints = np.column_stack(
-        [trajectory.times[first:-1] + cycles * period, trajectory.states[first:-1]]
-    )
-    itinerary, end = trajectory.itinerary_from(first + 1), float(trajectory.times[-1])
-    if not model.autonomous:
-        end = float(joints[0, 0]) + turns * period
-    smooth = is_smooth(model, itinerary)
-    if model.autonomous and smooth:
-        turns = loops(model, itinerary, joints, end, vector)
-    itinerary, joints, end = without_sections(model, itinerary, joints, end, vector, turns)
-    if model.autonomous and not smooth:
-        turns = len(itinerary) // primitive_length(itinerary)
-    joints = clocked(model, joints, end)
-    try:
-        system = build_system(model, itinerary, turns)
-    except ValueError:
-        return None
-    return Orbit(system, joints, vector, np.inf, Status.NOT_CONVERGED)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,39 +15,21 @@ from numpy.typing import NDArray
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.work import TileTask, Work
-from contfric.errors import (
-    ParameterError,
-    did_you_mean,
-    function_of,
-    shown,
-    whole_number,
-)
+from contfric.errors import function_of, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
 from contfric.models.tied import tied
-from contfric.orbit.structure import mirror_mode
 from contfric.orbit.system import IntArray
-from contfric.orbit.tables import tables
 from contfric.remember.folder import kept_in
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following
 from contfric.response.returns import ReleaseMap
 from contfric.response.sections import RELEASES, section_of
 from contfric.response.sweeping import compiled, positive
+from contfric.response.ways_out_of_rest import release_of
 
-#: A release counts if the surfaces are met to this (relative to 1 + state).
-_MET = 1e-12
 #: Bytes of a release: its parameters, its events, its results.
 _BYTES = 512
-
-
-class _WayOutOfRest(NamedTuple):
-    """A way out of rest: mode, surface, mode that follows, surfaces that it starts on as bits."""
-
-    mode: int
-    surface: int
-    following: int
-    on: int
 
 
 def release_map(
@@ -110,24 +91,16 @@ def release_map(
     tile = whole_number("tile", tile, least=1)
     count = whole_number("count", count, least=2)
     must_fit(f"a map of {count} releases", _BYTES * count)
-    release, rest = release_of(model, surface)
-    period = model.view(vector).period
-    times: FloatArray = np.arange(count, dtype=np.float64) * (period / count)
-    states: FloatArray = np.array(
-        [_state_at(model, vector, release, rest, float(t)) for t in times]
-    )
-    possible = np.flatnonzero(
-        [_leaves(model, vector, release, float(t), y) for t, y in zip(times, states, strict=True)]
-    )
-    times, states = times[possible], states[possible]
-    image = image_of(model, release)
+    way, view = release_of(model, surface), model.view(vector)
+    grid = np.arange(count) * (view.period / count)
+    begun = [(t, y) for t in grid.tolist() if (y := way.state_at(view, t)) is not None]
+    times: FloatArray = np.array([t for t, _ in begun])
+    states: FloatArray = np.array([y for _, y in begun]).reshape(-1, len(model.states))
     joints = np.zeros((len(model.modes), len(model.surfaces)), dtype=np.int64)
-    for mode, k in ((release.mode, release.surface), *(() if image is None else (image,))):
+    for mode, k in filter(None, ((way.mode, way.surface), way.image)):
         joints[mode, k] = 1
     whole = ReleaseTile(
-        *(model, vector, joints, release.following, release.on),
-        *(times.copy(), states.reshape(-1, len(model.states)).copy()),
-        positive("periods", periods),
+        *(model, vector, joints, way.following, way.on, times, states), positive("periods", periods)
     )
     work: Work[ReleaseTile, ReleaseRows] = Work(
         *("release map", compute_release_tile, executor, progress),
@@ -137,93 +110,13 @@ def release_map(
     rows = ReleaseRows.empty(len(times), len(model.states))
     with kept_in(folder):
         work.finish([whole.part(part) for part in parts], lambda k, got: rows.put(parts[k], got))
-    found = rows.found
+    found, period = rows.found, view.period
     returns, images = np.full(len(times), np.nan), np.full(len(times), np.nan)
     returns[found] = (rows.times + rows.cycles * period - times)[found]
-    shifts = _shifts(model, vector, release, period, rows.times[found], rows.states[found])
+    shifts = way.shifts(view, rows.times[found], rows.states[found])
     images[found] = np.mod(rows.times[found] + shifts, period)
     branch = _branches(rows.itineraries, times, images, 1.5 * period / count, period)
-    names = model.modes[release.mode].name, model.surfaces[release.surface].name
-    return ReleaseMap(model, vector, *names, period, times, images, returns, branch, states)
-
-
-def release_of(model: Model, surface: str | None) -> tuple[_WayOutOfRest, str]:
-    """Return the way out of rest, and the surface that the mode rests on."""
-    wanted = [m for m in model.modes if m.sliding]
-    if model.autonomous or len(model.states) != 2 or not wanted:
-        raise ParameterError(
-            f"model '{model.name}' has no release map: that takes two states, a mode of rest and an "
-            "excitation, so that a release is known by its phase; cf.poincare(..., section='releases') "
-            "takes any model with a mode of rest"
-        )
-    surfaces = [s.name for s in model.surfaces]
-    ways = {
-        exit_: (domain, target)
-        for (domain, exit_), target in model.transitions.items()
-        if model.domain_by_name[domain].mode == wanted[0].name
-    }
-    surface = next((name for name in surfaces if name in ways), "") if surface is None else surface
-    if surface not in [*ways]:
-        raise ParameterError(
-            f"surface is one that rest is left at, one of {', '.join(ways)}, got {shown(surface)}"
-            f"{did_you_mean(surface, ways)}"
-        )
-    domain, target = (model.domain_by_name[name] for name in ways[surface])
-    rests = next((n for n, sign in domain.signs.items() if sign == 0), surface)
-    mode, k, found = model.mode_index[domain.mode], model.surface_index[surface], tables(model)
-    on = int(found.landed[mode, k] | (found.lies_on[mode] & found.kept[mode, k]))
-    return _WayOutOfRest(mode, k, model.mode_index[target.mode], on), rests
-
-
-def image_of(model: Model, release: _WayOutOfRest) -> tuple[int, int] | None:
-    """Return (mode, surface) of the image of a release under the symmetry; None if there is no other."""
-    if model.symmetry is None:
-        return None
-    name = model.surfaces[release.surface].name
-    image = model.symmetry.surfaces.get(name, name)
-    mode = mirror_mode(model)[model.modes[release.mode].name]
-    if image == name:
-        return None
-    return model.mode_index[mode], model.surface_index[image]
-
-
-def _state_at(
-    model: Model, vector: FloatArray, release: _WayOutOfRest, rests: str, t: float
-) -> FloatArray:
-    """Return the state at a release at a time: on both surfaces, by Newton's method, or nan."""
-    names = model.surfaces[release.surface].name, rests
-    found = model.view(vector).landed(names, t, np.zeros(len(model.states)), _MET)
-    return np.full(len(model.states), np.nan) if found is None else found
-
-
-def _leaves(
-    model: Model, vector: FloatArray, release: _WayOutOfRest, t: float, y: FloatArray
-) -> bool:
-    """Tell whether rest comes to its limit there, from within."""
-    if not np.all(np.isfinite(y)):
-        return False
-    surface = model.surfaces[release.surface]
-    domain = next(d for d in model.domains if d.mode == model.modes[release.mode].name)
-    rate = model.view(vector).rate(domain.mode, surface.observable, t, y)
-    return -domain.signs[surface.name] * rate > 0.0
-
-
-def _shifts(
-    model: Model,
-    vector: FloatArray,
-    release: _WayOutOfRest,
-    period: float,
-    times: FloatArray,
-    states: FloatArray,
-) -> FloatArray:
-    """Return the shift in time of each point: none at the surface itself, that of the symmetry elsewhere."""
-    image = image_of(model, release)
-    if model.symmetry is None or image is None:
-        return np.zeros(len(times))
-    view, names = model.view(vector), [model.surfaces[k].name for k in (release.surface, image[1])]
-    rows = zip(times.tolist(), states, strict=True)
-    apart = np.abs([[view.height(name, t, y) for name in names] for t, y in rows]).reshape(-1, 2)
-    return np.where(apart[:, 0] <= apart[:, 1], 0.0, model.symmetry.fraction * period)
+    return ReleaseMap(model, vector, *way.names, period, times, images, returns, branch, states)
 
 
 def _branches(

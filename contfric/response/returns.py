@@ -248,19 +248,18 @@ def horseshoe_of(releases: ReleaseMap, most: int) -> Horseshoe:
     need_flint()
     from contfric.certify.horseshoe import Sampled, find_horseshoe
     from contfric.certify.returns import Release
-    from contfric.response.release import image_of, release_of
+    from contfric.response.ways_out_of_rest import release_of
 
     model = releases.model
-    way, rests = release_of(model, releases.surface)
-    image = image_of(model, way)
+    way = release_of(model, releases.surface)
     surfaces = [s.name for s in model.surfaces]
     release = Release(
         releases.mode,
         releases.surface,
-        rests,
+        way.rests,
         way.following,
         way.on,
-        surfaces[image[1]] if image else "",
+        surfaces[way.image[1]] if way.image else "",
     )
     longest = max(releases.branches, key=lambda pair: len(pair[0]), default=(np.zeros(1),) * 2)
     starts = longest[0][:: max(1, len(longest[0]) // 5)]

@@ -135,7 +135,4 @@ def _check_example(located: LocatedYaml, model: Model, example: dict[str, float]
         if key not in model.parameter_names:
             hint = did_you_mean(key, model.parameter_names)
             located.fail(("example", key), f"model '{model.name}' has no parameter '{key}'{hint}")
-    try:
-        model.check_params(example)
-    except ParameterError as error:
-        located.fail(("example",), str(error))
+    located.attempt(("example",), lambda: model.check_params(example))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from contfric.base.yaml_lines import Address, LocatedYaml, read_yaml
 from contfric.base.yaml_schema import validated
-from contfric.errors import NotationError, ParameterError, ResultFileError, StudyError, did_you_mean
+from contfric.errors import NotationError, ParameterError, StudyError, did_you_mean
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.models.paths import relative_name
@@ -121,10 +122,8 @@ def _validated(located: LocatedYaml) -> StudyFile:
 
 
 def _checked(located: LocatedYaml, content: StudyFile) -> Study:
-    try:
-        model = load_model(relative_name(content.model, located.path))
-    except ParameterError as error:
-        located.fail(("model",), str(error))
+    name = relative_name(content.model, located.path)
+    model = located.attempt(("model",), lambda: load_model(name))
     whole, (model, content) = content, _tied(located, content, model)
     params = _params(located, content, model)
     orbit = _orbit(located, content, model)
@@ -152,20 +151,14 @@ def _tied(located: LocatedYaml, content: StudyFile, model: Model) -> tuple[Model
     """Return the model with its tied parameters, and the study without them."""
     for name, value in content.params.items():
         if isinstance(value, dict):
-            try:
-                model, _ = tied(model, {name: value})
-            except ParameterError as error:
-                located.fail(("params", name), str(error))
+            model, _ = located.attempt(("params", name), partial(tied, model, {name: value}))
     free = {name: value for name, value in content.params.items() if not isinstance(value, dict)}
     return model, content.model_copy(update={"params": free})
 
 
 def _params(located: LocatedYaml, content: StudyFile, model: Model) -> dict[str, float]:
     for name in content.params:
-        try:
-            model.index_of(name)
-        except ParameterError as error:
-            located.fail(("params", name), str(error))
+        located.attempt(("params", name), partial(model.index_of, name))
     try:
         return model.check_params(content.params)
     except ParameterError as error:
@@ -205,10 +198,8 @@ def _signature(located: LocatedYaml, content: StudyFile, model: Model) -> Signat
     source = content.start.signature
     if source is None:
         return None
-    try:
-        return load_signature(relative_name(source, located.path), model)
-    except NotationError as error:
-        located.fail(("start", "signature"), str(error))
+    name = relative_name(source, located.path)
+    return located.attempt(("start", "signature"), lambda: load_signature(name, model))
 
 
 def _orbit(located: LocatedYaml, content: StudyFile, model: Model) -> Orbit | None:
@@ -218,10 +209,7 @@ def _orbit(located: LocatedYaml, content: StudyFile, model: Model) -> Orbit | No
     from contfric.results import load
 
     address = ("start", "orbit")
-    try:
-        orbit = load(located.path.parent / source, model)
-    except ResultFileError as error:
-        located.fail(address, str(error))
+    orbit = located.attempt(address, lambda: load(located.path.parent / source, model))
     if not isinstance(orbit, Orbit):
         located.fail(
             address,
@@ -269,7 +257,4 @@ def _check_quantities(located: LocatedYaml, content: StudyFile, model: Model) ->
         valid = list(dict.fromkeys((*others, *known)))
         if name.isidentifier() and name not in known:
             located.fail(address, f"'{place}' has no '{name}'{did_you_mean(name, valid)}")
-        try:
-            number_quantity(name, model, f"'{place}'")
-        except ParameterError as error:
-            located.fail(address, str(error))
+        located.attempt(address, partial(number_quantity, name, model, f"'{place}'"))

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import contfric as cf
-from contfric.orbit import sections
+from contfric.orbit.section_crossings import every_crossing
 from contfric.orbit.solve import refine
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -115,7 +115,7 @@ def test_joints_of_a_smooth_cycle_are_of_no_importance() -> None:
     """Whichever crossings a cycle is found by: the same events, and joints move before they vanish."""
     orbit = cf.find_orbit(WALLS, {**SMOOTH, "a": 2.5}).as_whole()
     expected = [(b.kind, b.params["a"]) for b in branch("smooth").bifurcations]
-    itinerary, joints = sections._every_crossing(orbit)
+    itinerary, joints = every_crossing(orbit)
     assert len(itinerary) == 6 and len(orbit.itinerary) == 2
     for down in (i for i in range(6) if orbit.model.section_sides[itinerary[i]] > 0):
         own = joints[[(down + 1) % 6, (down + 2) % 6]].copy()

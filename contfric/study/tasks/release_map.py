@@ -30,7 +30,7 @@ class ReleaseMapTask(Response):
 
     def check(self, asked: StudyCheck) -> None:
         """Check that releases of the model are told by their phase, and the surface."""
-        from contfric.response.release import release_of
+        from contfric.response.ways_out_of_rest import release_of
 
         asked.attempt((self.name,), lambda: release_of(asked.model, self.surface))
 

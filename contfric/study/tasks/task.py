@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import Field
 
 from contfric.base.yaml_schema import SchemaPart, keys_of, whole
-from contfric.errors import ContfricError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,10 +94,7 @@ class StudyCheck:
 
     def attempt(self, address: Address, step: Callable[[], object]) -> None:
         """Take a step of which an error of the input belongs to an entry of the file."""
-        try:
-            step()
-        except ContfricError as error:
-            self.fail(address, str(error))
+        self.located.attempt(address, step)
 
     def check_state(self, address: Address, state: list[float] | None) -> None:
         """Check the number of states, if there are any."""
