@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from contfric.base.interrupts import held_back
 from contfric.base.tally import tally
 from contfric.continuation.points import SMALLEST_STEP, Point, PointRows
 from contfric.curves.problem import Problem, border_of
@@ -56,8 +56,8 @@ class Conditioned(Protocol):
     def conditions(self) -> tuple[Condition, Conditions]:
         """Return what vanishes, as the compiled engine takes it."""
 
-    def raise_kept(self) -> None:
-        """Raise what a function has raised that the compiled engine has called."""
+    def calling(self) -> AbstractContextManager[None]:
+        """Return the context in which the compiled engine may call a function of Python."""
 
 
 def compiled_problem(problem: Conditioned) -> CurveProblem:
@@ -97,9 +97,8 @@ def march_rows(
         options[BUDGET], before, began = _PACE.budget, int(counts[0]), perf_counter()
         taken, k = taken + last - k, last
         course = Course(options, corners, k, start_z, start_w, taken, arrays, counts)
-        with held_back():  # compiled code may call Python, which would print Ctrl-C and drop it
+        with problem.calling():
             why, last, options[0] = march_curve(compiled, border, course)
-        problem.raise_kept()
         _PACE.took(int(counts[0]) - before, perf_counter() - began)
     return int(why), int(last), float(options[0])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -69,8 +70,9 @@ class Problem:
 
         return self.condition, no_quantity()
 
-    def raise_kept(self) -> None:
-        """Raise nothing: the engine calls no function of Python for this problem."""
+    def calling(self) -> AbstractContextManager[None]:
+        """Return the context of a march that calls no function of Python: none is needed."""
+        return nullcontext()
 
     @cached_property
     def limits(self) -> FloatArray:

@@ -16,13 +16,15 @@ differentiated in q + 1 directions only. Of integrals and extrema the row itself
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.interrupts import held_back
 from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import solve_point
 from contfric.curves.ranges import Ranges, limits_of
@@ -239,8 +241,11 @@ class Held:
         """Return what vanishes, as the compiled engine takes it."""
         return self._compiled[:2]
 
-    def raise_kept(self) -> None:
-        """Raise what the function of the conditions has raised."""
+    @contextmanager
+    def calling(self) -> Iterator[None]:
+        """Hold Ctrl-C back, which compiled code would print and drop; raise what a function has raised."""
+        with held_back():
+            yield
         called = self._compiled[2]
         if called.raised is not None:
             error, called.raised = called.raised, None
