@@ -19,6 +19,8 @@ _FIRST, _SHORTEST, _GROWTH = 1e-3, 1e-10, 1.6
 _TURN, _STRAIGHT = 0.985, 0.9986
 #: A fold and a branch point nearer than this are one point: that is located to the root of rounding.
 _VERTEX = 1e-6
+#: The boundary that a run begins on is met nowhere nearer than this again: a millionth of the first step.
+_AT_START = 1e-9
 #: A state beyond this many natural sizes has left to infinity.
 _AWAY = 1e4
 
@@ -86,6 +88,8 @@ def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
             run.end = BranchEnd.AWAY
             return run
         for crossing in crossings(arc, last, following):
+            if last is start and _is_start(crossing, start):
+                continue
             run.crossings.append(crossing)
             if _leaves(arc, crossing):
                 run.places.append(crossing.place)
@@ -98,6 +102,12 @@ def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
             run.end = BranchEnd.CLOSED
             return run
     return run
+
+
+def _is_start(crossing: LocatedSignChange, start: CurvePoint) -> bool:
+    """Tell whether an event is the boundary that a run begins on: its height there is rounding."""
+    on_surface = crossing.test not in ("SN", "BP", "H")
+    return on_surface and bool(np.max(np.abs(crossing.place.x - start.x)) < _AT_START)
 
 
 class _Closing:

@@ -119,9 +119,16 @@ def limit_departures(
             if all(d is not None and d.where == through for d in first):
                 continue  # they were asked of this limit
             apart = [_mode_at(modes, regions, on[0], side) for side in (1, -1)]
-            left = _limit_side(sampler, known, (on[0], limit), apart)
-            if left and any(d is None or d.leaves != {on[0]: left} for d in first):
-                limits.append(Departure({**known, **through}, {on[0]: left}))
+            # where other surfaces divide the modes beside it, each region is asked
+            for asked in [known] if all(apart) else regions:
+                beyond = {**asked, **through}
+                inside = {**beyond, limit: known[limit]}
+                pair = (
+                    apart if all(apart) else [_mode_at(modes, [beyond], on[0], s) for s in (1, -1)]
+                )
+                left = _limit_side(sampler, inside, (on[0], limit), pair)
+                if left and any(d is None or d.leaves != {on[0]: left} for d in first):
+                    limits.append(Departure(beyond, {on[0]: left}))
     return tuple(limits)
 
 
@@ -147,7 +154,8 @@ def _limit_side(
 
     Sliding ends where the field of one side leads to the surface no more, while that of the other still does:
     its rate is zero at the limit, or has another sign (a static limit above the kinetic one). Places where
-    the mode holds tell; where no random state comes to one, all places at the limit, if they agree.
+    the mode holds tell; where no random state comes to one, all places at the limit, if they agree. Where
+    no place at the limit is found (at the defaults a contact never slips), the limit may be that rate itself.
 
     Parameters
     ----------
@@ -169,7 +177,26 @@ def _limit_side(
                 continue
             verdicts[other.sides(*place, others) == others].add(-inward[0])
     told = verdicts[True] or verdicts[False]
+    if not told:
+        return _vanishing_side(sampler, known, pair, apart)
     return told.pop() if len(told) == 1 else 0
+
+
+def _vanishing_side(
+    sampler: Sampler, known: Mapping[str, int], pair: tuple[str, str], apart: Sequence[str]
+) -> int:
+    """Return the side of a surface whose rate is the height of a limit of sliding on it; 0 if neither is.
+
+    So are the limits of Filippov's sliding: the field of that side is tangent to the surface there, and leads
+    to it where sliding goes on.
+    """
+    on, limit = pair
+    found = {1, -1}
+    for t, y in sampler.on(on, {}, _PLACES):
+        height = known[limit] * sampler.evaluator.height(limit, sampler.params, t, y)
+        rates = {side: side * sampler.rate(apart[side < 0], on, side, t, y) for side in found}
+        found = {s for s, rate in rates.items() if abs(rate + height) <= _STILL * (1.0 + abs(rate))}
+    return found.pop() if len(found) == 1 else 0
 
 
 def _both_met(
@@ -248,7 +275,9 @@ def leaves_at_rest(sampler: Sampler, description: Description, domains: tuple[Do
     at = {tuple(sorted(d.signs.items())): d for d in domains}
     found = False
     for on, limit in sorted(pairs):
-        verdicts = _left_at_rest(sampler, on, limit, at)
+        verdicts = _left_at_rest(sampler, on, limit, at) or _left_by_tangency(
+            sampler, on, limit, at
+        )
         if False in verdicts:  # one place decides
             return False
         found = found or bool(verdicts)
@@ -279,6 +308,19 @@ def _left_at_rest(
             if places == _PLACES:
                 break
     return found
+
+
+def _left_by_tangency(
+    sampler: Sampler, on: str, limit: str, at: Mapping[tuple[tuple[str, int], ...], Domain]
+) -> set[bool]:
+    """Return true where a limit that is met nowhere is the rate of a side: nothing if it is not."""
+    for rest in (d for d in at.values() if d.signs[on] == 0 and d.signs[limit] != 0):
+        beyond = {**rest.signs, limit: -rest.signs[limit]}
+        beside = [at.get(tuple(sorted({**beyond, on: side}.items()))) for side in (1, -1)]
+        apart = [d.mode for d in beside if d is not None]
+        if len(apart) == 2 and _vanishing_side(sampler, rest.signs, (on, limit), apart):
+            return {True}
+    return set()
 
 
 def _beside_limit(

@@ -11,6 +11,7 @@ from functools import cache
 
 from contfric.models.definition import Model
 from contfric.models.made import Made
+from contfric.models.regions import is_possible
 from contfric.models.structure_model import ComposedModel
 
 
@@ -28,7 +29,25 @@ def cut_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Surfaces that bound each mode as it was declared, sections among them: a simulation stops there."""
     if isinstance(model, ComposedModel):
         return Made(model.cuts_of, model.composition.is_mode)
-    return _bounds(model, {d.name: d.own_mode for d in model.domains})
+    found = _bounds(model, {d.name: d.own_mode for d in model.domains})
+    return {mode: (*bounds, *_open_ends(model, mode, bounds)) for mode, bounds in found.items()}
+
+
+def _open_ends(model: Model, mode: str, bounds: tuple[str, ...]) -> tuple[str, ...]:
+    """Return surfaces that a mode lies on one side of, with nothing behind: a solution ends there.
+
+    Not those behind another level of the same observable, which is met first.
+    """
+    own = [d for d in model.domains if d.own_mode == mode]
+    found = []
+    for surface in (s.name for s in model.surfaces if s.name not in bounds):
+        sides = {d.signs[surface] for d in own}
+        if surface in model.settled_sides or len(sides) != 1 or sides == {0}:
+            continue
+        beyond = ({**d.signs, surface: -d.signs[surface]} for d in own)
+        if any(is_possible(list(model.surfaces), signs) for signs in beyond):
+            found.append(surface)
+    return tuple(found)
 
 
 def _bounds(model: Model, modes: dict[str, str]) -> dict[str, tuple[str, ...]]:

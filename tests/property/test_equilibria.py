@@ -129,6 +129,25 @@ def test_boundary_equilibria_are_what_their_product_says(seed: int) -> None:
     assert len(beside[step]) == (product < 0) and len(beside[-step]) == (product > 0)
 
 
+@pytest.mark.parametrize("seed", [136, 137, 138])
+def test_each_boundary_is_met_once_and_unfolds_as_its_product_says(seed: int) -> None:
+    """A branch that goes on from a boundary begins there to rounding, on either side of it."""
+    rng = np.random.default_rng(seed)
+    a, b = system(rng, 3)
+    inverse = np.linalg.inv(a[0])
+    critical = -(inverse @ b[0])[0] / inverse[0, -1]
+    model = model_of(a, b)
+    sign = 1.0 if -inverse[0, -1] > 0 else -1.0
+    found = cf.find_equilibria(model, {"m": critical + 0.1 * sign})
+    (start,) = [e for e in found if e.mode == "plus"]
+    branch = cf.continue_equilibrium(start, "m", (critical - 0.2, critical + 0.2))
+    events = branch.of_kind("BE")
+    assert len({round(e.value, 9) for e in events}) == len(events) > 0
+    for event in events:
+        if np.isfinite(event.product):
+            assert event.unfolding.name == ("PERSISTENCE" if event.product > 0 else "FOLD")
+
+
 def test_a_pole_is_no_zero() -> None:
     """The friction law of one mode, gone on with, has its pole where the equilibrium would be."""
     poles = 0
