@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.holdable import NoJump
 from contfric.continuation.limits import limit_end
 from contfric.continuation.locations import locations_of
@@ -37,6 +37,9 @@ _PART = 1e-2
 #: A turn this much longer than at the start, along a parameter whose share of the tangent is below this,
 #: comes to an equilibrium.
 _LONGER, _STANDS = 1.5, 1e-6
+#: Share of the period over which nothing but it may have changed: a saddle with complex eigenvalues makes a
+#: branch turn again and again, with folds at which nothing changes for a moment.
+_LATELY = 0.25
 
 #: A parameter that changes by less than this share of the range over hundreds of points, while states are
 #: this large and grow by this factor, comes to a resonance.
@@ -238,6 +241,23 @@ def slows_down(side: Side, settings: Settings) -> bool:
         abs(tip.slope) < _STANDS * settings.width
         and tip.joints[0, 0] < _LONGER * first.joints[0, 0]
     )
+
+
+def only_lengthens(side: Side, settings: Settings) -> bool:
+    """Tell whether only the period has changed along a side before its last point, by a part of itself.
+
+    Next to a homoclinic orbit parameter and states differ by less than events are known to. The passage of
+    the saddle multiplies rounding until no joint after it has its place: what is met there is no event.
+    """
+    if not side.autonomous or side.last < 1:
+        return False
+    values, joints = (side.column(name)[:-1] for name in ("values", "joints"))
+    shorter = np.flatnonzero(-joints[:, 0, 0] < (1.0 - _LATELY) * -joints[-1, 0, 0])
+    if not shorter.size:
+        return False
+    values, states = values[shorter[-1] :], joints[shorter[-1] :, :, 1:]
+    moved = np.max(np.ptp(states, axis=0)) / (1.0 + np.max(np.abs(states)))
+    return bool(max(moved, np.ptp(values) / settings.width) < ACCURACY)
 
 
 def grows(side: Side, settings: Settings) -> bool:

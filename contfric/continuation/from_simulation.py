@@ -2,20 +2,24 @@
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
 met at once), solutions near the orbit at the event have its itinerary or that of the orbit that takes over.
-So motions that start near it are followed for one turn, and each itinerary that is new is proposed. It takes
-no knowledge of the event, and finds nothing where what follows repels too fast to be simulated.
+So motions that start near it are followed for one turn, and each itinerary that is new is proposed. Near a
+symmetric orbit few of them do the same in both halves of a turn: what they do in one half, and its mirror
+image, is proposed, too. It takes no knowledge of the event, and finds nothing where what follows repels too
+fast to be simulated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
-from contfric.models.definition import Domain, FloatArray
+from contfric.models.definition import Domain, FloatArray, Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.conserved import conserved
+from contfric.orbit.itineraries import whole_of
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import is_smooth, without_sections
@@ -60,8 +64,10 @@ def solutions_near(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> 
     """
     own, seen = canonical_itinerary(orbit.itinerary, orbit.model), set()
     start = _inside(orbit)
-    for size, vector, state in _starts_near(orbit, start[1], shifts):
-        found = _one_turn(orbit, start, vector, state)
+    parts = (False, True) if orbit.symmetric else (False,)
+    starts = _starts_near(orbit, start[1], shifts)
+    for (size, vector, state), half in product(starts, parts):
+        found = _one_turn(orbit, start, vector, state, half)
         if found is not None and size == np.inf:
             found = _without_creep(orbit, found, start, state) or found
         if found is None:
@@ -115,19 +121,29 @@ def _starts_near(
 
 
 def _one_turn(
-    orbit: Orbit, start: tuple[int, float], vector: FloatArray, state: FloatArray
+    orbit: Orbit,
+    start: tuple[int, float],
+    vector: FloatArray,
+    state: FloatArray,
+    half: bool = False,
 ) -> Orbit | None:
-    """Follow a solution for one turn; return the orbit that it nearly is, None if it breaks off."""
-    model, (i, time) = orbit.model, start
+    """Follow a solution for one turn; return the orbit that it nearly is, None if it breaks off.
+
+    Or for half a turn: then the orbit is that and its mirror image.
+    """
+    model, (i, time), turn = orbit.model, start, orbit.period * (0.5 if half else 1.0)
     mode = model.mode_index[_declared(orbit, i, time, state)]
     unit = 1.0 if model.autonomous else orbit.period / orbit.periods
-    trajectory = run(model, vector, mode, 0, time, state, _LONGER * orbit.period / unit, _EVENTS)
-    stop = _end_of_turn(orbit, trajectory, start, unit)
+    trajectory = run(model, vector, mode, 0, time, state, _LONGER * turn / unit, _EVENTS)
+    stop = _end_of_turn(orbit, trajectory, start, unit, half)
     if stop is None:
         return None
     itinerary: Itinerary = trajectory.itinerary[:stop]
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
     joints = np.column_stack([clock, trajectory.states])[:stop]
+    if half:
+        itinerary = whole_of(model, itinerary, half)
+        joints = np.vstack([joints, _image(model, joints, turn)])
     end = float(joints[-1, 0])
     joints = np.roll(joints, 1, axis=0)
     joints[0, 0] = end - orbit.period
@@ -142,6 +158,15 @@ def _one_turn(
     except ValueError:
         return None
     return Orbit(system, clocked(model, joints, end), vector.copy(), np.inf, Status.NOT_CONVERGED)
+
+
+def _image(model: Model, joints: FloatArray, later: float) -> FloatArray:
+    """Return the mirror image of joints, half a turn later."""
+    assert model.symmetry is not None
+    image = joints.copy()
+    image[:, 0] += later
+    image[:, 1:] = image[:, 1:] @ model.symmetry.array().T
+    return image
 
 
 def _without_creep(
@@ -182,15 +207,16 @@ def _where_orbit_is(orbit: Orbit, found: Orbit) -> Orbit:
 
 
 def _end_of_turn(
-    orbit: Orbit, trajectory: Trajectory, start: tuple[int, float], unit: float
+    orbit: Orbit, trajectory: Trajectory, start: tuple[int, float], unit: float, half: bool
 ) -> int | None:
-    """Return the number of events of one turn; None if the solution is in another mode after it."""
+    """Return the number of events of a turn, or half of one; None if the mode after it is another one."""
     model, itinerary = orbit.model, trajectory.itinerary
     clock = trajectory.times + trajectory.cycles * unit * (not model.autonomous)
     i, time = start
-    count = int(np.searchsorted(clock, time + orbit.period))
+    count = int(np.searchsorted(clock, time + orbit.period * (0.5 if half else 1.0)))
     mode = itinerary[count][0] if count < len(itinerary) else trajectory.last[3]
-    same = bool(mode) and model.whole_mode(mode) == model.whole_mode(orbit.itinerary[i][0])
+    own = orbit.itinerary[i - len(orbit.itinerary) // 2 if half else i][0]
+    same = bool(mode) and model.whole_mode(mode) == model.whole_mode(own)
     return count if count > 0 and same else None
 
 

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from contfric.continuation.geometry import Points
 
 
+#: Cosine of an angle by which no tangent turns over a step: three times the most that is accepted.
+_TURNED = 0.5
+
+
 class _Trials(threading.local):
     """Four rows for locations, of the system last at work in this thread: allocated once a branch."""
 
@@ -27,14 +31,21 @@ class _Trials(threading.local):
     rows: PointRows
     arrays: Points
 
-    def between(self, system: System, before: Point, after: Point) -> PointRows:
-        """Return the rows with both points, and nothing of an earlier location."""
+    def between(self, system: System, before: Point, after: Point, scale: float) -> PointRows:
+        """Return the rows with both points, and nothing of an earlier location.
+
+        No step turns by as much as :data:`_TURNED`. The tangent of a point that does is rounding: a segment
+        has no length there. A cubic with it would leave the branch and turn back.
+        """
         if self.system is not system:
             self.rows, self.system = PointRows.empty(system, 4), system
             self.arrays = self.rows.arrays()
         rows = self.rows
         rows.put(0, before)
         rows.put(1, after)
+        along = float(np.vdot(before.tangent, after.tangent)) / len(before.tangent)
+        if along + scale * before.slope * after.slope < _TURNED:
+            rows.tangents[1], rows.directions[1] = before.tangent, before.direction
         rows.arc[2:], rows.tests[2:], rows.labels[2:], rows.mu[2:] = 0.0, 0.0, 0, 0.0
         return rows
 
@@ -88,7 +99,7 @@ def _located(
     """Return the location of one change of sign, and whether a label changes at one location only."""
     from contfric.continuation.bracket import BY_TEST, locate
 
-    rows = _TRIALS.between(orbit.system, before, after)
+    rows = _TRIALS.between(orbit.system, before, after, settings.scale)
     problem, sought = branch_problem(orbit, settings), sought_of(kind, index, target)
     at, plain = locate(problem, sought, bool(orbit.model.kinks), _TRIALS.arrays, tally())
     # behind -2 Newton fails: the last good point, marked as such

@@ -243,6 +243,12 @@ class Side:
         self._kept.append({name: getattr(self.rows, name)[rows] for name in self.names})
         self._fresh = stop
 
+    def column(self, name: str) -> FloatArray:
+        """Return one column of all points so far, of those that are kept."""
+        before = self._kept.arrays[name][: self._kept.count] if self._kept.count else None
+        here: FloatArray = getattr(self.rows, name)[self._fresh : self.last + 1]
+        return here if before is None else np.concatenate([before, here])
+
     def columns(self) -> GrowingColumns:
         """Return everything that is kept of the points; the side is finished."""
         self._keep(self.last + 1)

@@ -18,8 +18,8 @@ import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import endless, grows, never_leaves, slows_down
-from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason
+from contfric.continuation.ending import endless, grows, never_leaves, only_lengthens, slows_down
+from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason
 from contfric.continuation.limits import is_at_limit, limit_end
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
 from contfric.continuation.report import ROUGH
@@ -202,7 +202,7 @@ def trace_side(
             if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
             if side.end.reason is EndReason.PERIOD:
-                _forget_rounding(side, settings)
+                _forget_unresolved(side, settings)
             side.rows = side.rows.first(side.last + 1)
             return side
 
@@ -216,22 +216,17 @@ _MAY_BE_ENDLESS = frozenset(
 _NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
 
 
-#: Rounding of a parameter value that an orbit has been solved with, relative to 1 + its size.
-_ROUNDED = 64.0 * float(np.finfo(float).eps)
+def _forget_unresolved(side: Side, settings: Settings) -> None:
+    """Leave out the last events before an end of endless period, which differ from it by less than is known.
 
-
-def _forget_rounding(side: Side, settings: Settings) -> None:
-    """Leave out what has not been located where the period grows at one value of the parameter.
-
-    Points there differ by rounding alone, and so do their multipliers: they change sign for no reason.
+    Points there differ by rounding alone, and so do their multipliers: they change sign for no reason. Next
+    to a saddle with complex eigenvalues events never cease; which of them is the last would be a matter of
+    the step.
     """
-    end = side.tip.value
-    side.bifurcations = [
-        event
-        for event in side.bifurcations
-        if event.located
-        or abs(event.params[settings.parameter] - end) > _ROUNDED * (1.0 + abs(end))
-    ]
+    end, known = side.tip.value, ACCURACY * settings.width
+    events = side.bifurcations
+    while events and abs(events[-1].params[settings.parameter] - end) < known:
+        events.pop()
 
 
 def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:
@@ -249,6 +244,10 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, kept, side.last)
         return stopped or overshoot is Overshoot.ENDED, step
     if ends_at_corner(orbit, side, settings, side.count - count):
+        return True, step
+    if why == kernels.EVENT and only_lengthens(side, settings):
+        side.drop_tip()
+        side.end = End(EndReason.PERIOD)
         return True, step
     unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
     last, fresh = side.last - int(unresolved), side.count - count

@@ -28,3 +28,24 @@ def test_no_branch_runs_through_a_shorter_cycle(seed: int) -> None:
     assert not [b for b in again.bifurcations if b.kind is cf.Kind.BP], (
         "a doubling is no branch point"
     )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_next_to_a_homoclinic_orbit_a_branch_ends_where_only_its_period_grows(seed: int) -> None:
+    r"""The distance to the end falls as :math:`e^{-\lambda T}`, with the unstable eigenvalue of the saddle.
+
+    Before the end rounding, which the passage multiplies, makes no event and no point that is not admissible.
+    """
+    rng = np.random.default_rng([622, seed])
+    stiffness = float(rng.uniform(0.78, 0.9))
+    begun = cf.find_orbit(MODEL, {"A": 0.85, "C": stiffness}, longest=1000)
+    branch = cf.continue_orbit(begun, "A", (0.55, 1.0))
+    assert sorted(end.reason.name for end in branch.ends) == ["PD", "PERIOD"]
+    assert all(orbit.admissible for orbit in branch)
+    assert all(b.located and b.accuracy < 1e-6 for b in branch.bifurcations)
+    last = branch.values[0 if branch.ends[0].reason is cf.EndReason.PERIOD else -1]
+    periods = np.array([orbit.period for orbit in branch])
+    near = (periods > 20.0) & (periods < 35.0)
+    rate = np.polyfit(periods[near], np.log(np.abs(branch.values[near] - last)), 1)[0]
+    unstable = max(np.roots([1.0, last, stiffness, -1.0]), key=lambda root: float(root.real))
+    assert rate == pytest.approx(-unstable.real, rel=0.05)

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 import contfric as cf
+
+SOFT_STOP = (
+    Path(__file__).resolve().parents[2] / "benchmarks" / "stress" / "typed" / "softstop.yaml"
+)
 
 #: Two masses with friction, a friction element between them and a spring beyond a gap.
 _STRUCTURE = {
@@ -39,3 +45,16 @@ def test_tangencies_do_not_depend_on_the_step() -> None:
         found = [e.params["w"] for e in branch.bifurcations if e.kind is cf.Kind.T]
         assert len(found) == len(wanted), step
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-10)
+
+
+def test_a_point_on_a_segment_of_no_length_makes_no_label_change_elsewhere() -> None:
+    """A step may end just where a branch ends at a grazing: the tangent there is rounding.
+
+    A preloaded soft stop, explored again with finer steps from all of its branches.
+    """
+    params = {"omega": 0.5976646411553906, "k": 26.42116694776751, "zeta": 0.008944969323325445}
+    params |= {"c": 0.32076154914311195, "gap": 1.2492900425219953, "A": 1.176107959592724}
+    begun = cf.find_orbit(SOFT_STOP, params | {"pre": 0.23153438740497664}, longest=1000)
+    diagram = cf.explore(begun, "omega", (0.4469979761394101, 1.1953686313574419), max_periods=2)
+    found = diagram.verify(6)
+    assert found.passed, str(found)
