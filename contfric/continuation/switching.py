@@ -104,7 +104,8 @@ def overshoots(
     """Tell whether a start lies behind something that belongs to the branch, too.
 
     What watches a multiplier -1 has another sign there than near the branch point, a section is touched in
-    between, or the branch is no parabola there. Multipliers, and the parameter, may change so fast near a touch of a kink.
+    between, or the branch is no parabola there. Multipliers, and the parameter, may change so fast near a
+    touch of a kink.
     """
     from contfric.continuation.steps import CHI_MINUS
 

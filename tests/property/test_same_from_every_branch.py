@@ -106,10 +106,7 @@ def test_an_event_has_the_names_of_all_changes_between_its_branches(seed):
     ]
     followed = {forms[i] for i in rng.choice(len(forms), rng.integers(1, len(forms) + 1))}
     expected = {
-        ways[k][a[k]]
-        for a, b in product(followed, repeat=2)
-        for k in range(places)
-        if a[k] != b[k]
+        ways[k][a[k]] for a, b in product(followed, repeat=2) for k in range(places) if a[k] != b[k]
     }
     assert kinds_between(names, followed) == expected
 
@@ -130,5 +127,3 @@ def test_two_holds_that_change_together_have_one_name_from_every_branch():
         )
         assert [*differences(diagram, again), *differences(again, diagram)] == []
     assert any(bounds[0] < e.params["h"] < bounds[1] for e in diagram.of_kind("GS"))
-
-
