@@ -36,7 +36,7 @@ from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
 from contfric.continuation.events import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.continuation.from_simulation import solutions_near
-from contfric.continuation.incident import incident_forms
+from contfric.continuation.incident import incident_forms, kinds_between
 from contfric.continuation.partial_touches import partial_touches
 from contfric.continuation.points import Settings, next_to
 from contfric.orbit.conserved import conserved
@@ -125,9 +125,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
             if event.proposals and event.proposals[-1].verdict is not Decision.REFUSED:
                 itineraries |= candidate.itineraries
         follow_beside_family(state, event)
-        event.kinds |= {
-            n.kind for n in incident.names if n.before & itineraries and n.after & itineraries
-        }
+        event.kinds |= kinds_between(incident.names, itineraries)
         if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it

@@ -10,6 +10,7 @@ from contfric.continuation.doubling_point import opens_through
 from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.points import Point, Settings
 from contfric.continuation.report import ROUGH, bifurcation_at
+from contfric.continuation.side import point_before
 from contfric.continuation.split_touch import as_split
 from contfric.continuation.vertices import (
     parabola_vertex,
@@ -32,6 +33,8 @@ NEAR_ONE = 0.1
 _CONSTANT = 1e-7
 #: A located fold has a slope of rounding; this share of those around it is left at a jump only.
 _LEFT = 0.1
+#: Distance (arclength) up to which a branch is a parabola at a fold: a usual step.
+_PARABOLA = 1e-2
 #: A step shorter than this (arclength) is not taken back: there is nothing to be found in between.
 SHORTEST_OVERSHOOT = 1e-7
 #: An event with the point of the branch at which it is.
@@ -100,7 +103,11 @@ def fold_at(
         # of a bridge nothing but the parameter tells a fold
         known = vertex[0].accuracy * settings.width if settings.stability else 0.0
         size = orbit.model.size_of(orbit.model.index_of(settings.parameter), point.value)
-        return [vertex] if _turns(before, point, after, max(known, _ROUNDING * size)) else []
+        known = max(known, _ROUNDING * size)
+        sides = before, after
+        if not _turns(point, sides, known):
+            sides = _farther(orbit, point, sides, settings)
+        return [vertex] if _turns(point, sides, known) else []
     return [vertex]
 
 
@@ -166,13 +173,26 @@ def _is_vertical(orbit: Orbit, before: Point, after: Point, settings: Settings) 
     return all(float(np.abs(point.mu - 1.0).min()) < _MARGINAL for point in (before, after))
 
 
-def _turns(before: Point, point: Point, after: Point, known: float) -> bool:
+def _turns(point: Point, sides: tuple[Point, Point], known: float) -> bool:
     """Tell whether a parameter turns at a point that is known to an error, however slowly it does.
 
     On both sides its values lie on one side of that at the fold, and farther away than errors are.
     """
-    gaps = [side.value - point.value for side in (before, after)]
+    gaps = [side.value - point.value for side in sides]
     return gaps[0] * gaps[1] > 0.0 and min(map(abs, gaps)) > known
+
+
+def _farther(
+    orbit: Orbit, point: Point, sides: tuple[Point, Point], settings: Settings
+) -> tuple[Point, Point]:
+    """Return points as far on both sides of a fold as its step is long, or as a branch is a parabola.
+
+    A step may end so near to a fold that the parameter has changed by rounding only.
+    """
+    apart = max(_PARABOLA, *(abs(side.arc - point.arc) for side in sides))
+    ways = zip(sides, (apart, -apart), strict=True)
+    before, after = (point_before(orbit, point, back, settings) or side for side, back in ways)
+    return before, after
 
 
 def _is_jump(before: Point, point: Point, after: Point) -> bool:

@@ -18,9 +18,10 @@ An orbit at the event is a cyclic sequence of forms (:mod:`contfric.continuation
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -75,6 +76,30 @@ class Name:
     kind: Kind
     before: frozenset[Itinerary]
     after: frozenset[Itinerary]
+
+
+def kinds_between(names: Sequence[Name], followed: Set[Itinerary]) -> set[Kind]:
+    """Return the kinds of the steps that lead from one followed itinerary to another by the fewest steps.
+
+    Where several holds change at once, the itineraries with some of them changed need not be orbits.
+    """
+    steps: dict[Itinerary, list[tuple[Itinerary, Kind]]] = {}
+    for name in names:
+        for before, after in product(name.before, name.after):
+            steps.setdefault(before, []).append((after, name.kind))
+    kinds: set[Kind] = set()
+    for start in followed:
+        here, seen = {start: frozenset[Kind]()}, {start}
+        while here:
+            ahead: dict[Itinerary, frozenset[Kind]] = {}
+            for itinerary, met in here.items():
+                for after, kind in steps.get(itinerary, ()):
+                    if after not in seen:
+                        ahead[after] = ahead.get(after, frozenset()) | met | {kind}
+            seen |= ahead.keys()
+            here = ahead
+            kinds.update(*(ahead[itinerary] for itinerary in ahead.keys() & followed))
+    return kinds
 
 
 @dataclass(frozen=True, eq=False)

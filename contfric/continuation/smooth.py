@@ -113,7 +113,7 @@ def smooth_events(
             found.append(_overshot(orbit, kind, before, after, beyond, settings))
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
-    return [*found, *_tangencies(orbit, before, beyond, settings)]
+    return [*found, *tangencies(orbit, before, beyond, settings)]
 
 
 def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> bool:
@@ -224,7 +224,7 @@ def _is_pole(value: float, a: float, b: float) -> bool:
     return not np.isfinite(value) or abs(value) > 2.0 * max(abs(a), abs(b))
 
 
-def _tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
+def tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
     """Return the events T: changes of the surfaces that a segment crosses.
 
     At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.

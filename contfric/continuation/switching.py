@@ -103,8 +103,9 @@ def overshoots(
 ) -> bool:
     """Tell whether a start lies behind something that belongs to the branch, too.
 
-    What watches a multiplier -1 has another sign there than near the branch point, or the branch is no
-    parabola in between. Multipliers, and the parameter, may change so fast near a touch of a kink.
+    What watches a multiplier -1 has another sign there than near the branch point, a section is touched in
+    between, or the branch is no parabola there. Multipliers, and the parameter, may change so fast near a
+    touch of a kink.
     """
     from contfric.continuation.steps import CHI_MINUS
 
@@ -112,7 +113,8 @@ def overshoots(
     if nearer is None:
         return bool(orbit.model.kinks)  # elsewhere there is nothing to fail at
     watched = [float(p.tests[CHI_MINUS - EXTRA]) for p in (departure.point, nearer.point)]
-    if watched[0] * watched[1] < 0.0:
+    touched = departure.point.labels != nearer.point.labels
+    if watched[0] * watched[1] < 0.0 or touched.any():
         return True
     if not orbit.model.kinks:  # a corner would be the error of the event's own location
         return False

@@ -20,7 +20,8 @@ from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.folds import overshot_vertex, vertex_at
 from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.report import bifurcation_at
-from contfric.continuation.side import Side, first_point
+from contfric.continuation.side import Side, first_point, point_before
+from contfric.continuation.smooth import tangencies
 from contfric.continuation.vertices import (
     at_vertex,
     joints_like,
@@ -49,6 +50,11 @@ _NEAR = 1e-2
 _AT_ONE = 1e-2
 
 
+#: Distance (arclength) from a vertex at which its branch is asked what is just before it: states are known
+#: there to the root of rounding.
+_NEXT_TO = 1e-5
+
+
 class Overshoot(Enum):
     """What became of a side whose last points may have passed a vertex."""
 
@@ -74,6 +80,7 @@ def overshoots_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
     else:
         found = _gone_over(orbit, before, after, settings)
     if found is not None:
+        side.bifurcations += _touches_before(orbit, before, found[1], settings)
         side.rewind(passed[0] + 1)
         _end_at_vertex(orbit, side, settings, *found)
         return Overshoot.ENDED
@@ -85,6 +92,21 @@ def overshoots_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
         return Overshoot.BACK
     end_stalled(orbit, side, settings)
     return Overshoot.ENDED
+
+
+def _touches_before(
+    orbit: Orbit, before: Point, vertex: Point, settings: Settings
+) -> list[Bifurcation]:
+    """Return the sections that are touched between a point and the vertex that a step from it has passed.
+
+    Beyond the vertex the mirror image of the branch has the labels of the other half.
+    """
+    here = vertex.orbit(orbit, orbit.model.index_of(settings.parameter))
+    near = point_before(here, vertex, _NEXT_TO, settings)
+    if near is None or near.arc <= before.arc:
+        return []
+    touches = tangencies(orbit, before, near, settings)
+    return [event for event, _ in sorted(touches, key=lambda located: located[1].arc)]
 
 
 def _gone_unseen(

@@ -1,0 +1,129 @@
+"""Folds, touches and names of events do not depend on where steps end, nor on the branch that arrives."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+import contfric as cf
+from contfric.atlas.verification import STEP, differences
+from contfric.base.attributes import altered
+from contfric.continuation import smooth
+from contfric.continuation.events import Kind
+from contfric.continuation.folds import fold_at
+from contfric.continuation.incident import Name, kinds_between
+from contfric.continuation.points import LARGEST_STEP
+from contfric.continuation.side import point_before
+
+#: A bridge turns over 1e-8 of its range.
+FOLD = {"Omega": 0.07742262128103025, "S0": 0.13762082006748685, "h": 0.0, "zeta": 1e-9}
+#: An asymmetric branch touches u = 0 next to the point at which it becomes symmetric.
+TOUCH = {"Omega": 0.3390492697931732, "S": 0.09820819315675781, "S0": 0.19211709392812384, "h": 0.0}
+#: Two holds of a bridge over three periods touch their limit together.
+HOLDS = {"Omega": 0.3599045472299525, "S": 0.1533706969500193, "S0": 0.36969068182533193}
+
+
+def _slow_fold(monkeypatch):
+    """Return what a bridge that hardly turns is asked at its fold, with the located point."""
+    asked = []
+
+    def located(orbit, before, after, beyond, point, settings):
+        if orbit.system.holds:
+            asked.append((orbit, point, settings))
+        return fold_at(orbit, before, after, beyond, point, settings)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(smooth, "fold_at", located)
+        orbit = cf.find_orbit("coulomb", {**FOLD, "S": 0.0810880207884525}, longest=1000)
+        cf.explore(orbit, "S", (0.0720337655, 0.0903702620), max_branches=12)
+    return asked
+
+
+def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
+    rng = np.random.default_rng(5)
+    asked = _slow_fold(monkeypatch)
+    assert asked
+    for orbit, point, settings in asked:
+        here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
+        for _ in range(8):
+            near, far = 10.0 ** rng.uniform(-7.0, -2.0), 10.0 ** rng.uniform(-4.0, -2.0)
+            near, far = (near, far) if rng.random() < 0.5 else (far, near)
+            before, after = (point_before(here, point, back, settings) for back in (near, -far))
+            found = fold_at(orbit, before, after, after, point, settings)
+            assert [event.kind for event, _ in found] == [Kind.SN]
+        # a parameter that goes on in the same direction does not turn
+        rising = altered(after, w=2.0 * point.w - after.w)
+        monkeypatch.setattr("contfric.continuation.folds._farther", lambda _o, _p, sides, _s: sides)
+        assert not fold_at(orbit, before, rising, rising, point, settings)
+        monkeypatch.undo()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_touches_next_to_a_branch_point_are_found_towards_it_and_away_from_it(seed):
+    rng = np.random.default_rng(seed)
+    params = TOUCH | {"S": TOUCH["S"] * (1.0 + rng.uniform(-2e-5, 2e-5)), "zeta": 0.0}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    diagram = cf.explore(orbit, "zeta", (0.0, 0.03))
+    branch = next(
+        b
+        for b in diagram.branches
+        if [e.reason.name for e in b.ends if e.bifurcation and e.bifurcation.kind is Kind.BP]
+        and any(e.kind is Kind.T for e in b.bifurcations)
+    )
+    vertex = next(e for e in branch.bifurcations if e.kind is Kind.BP)
+    touches = [e.params["zeta"] for e in branch.bifurcations if e.kind is Kind.T]
+    assert min(abs(t - vertex.params["zeta"]) for t in touches) < 3e-7
+    start = branch[len(branch) // 2]
+    for step in rng.uniform(0.1, 1.0, 4) * LARGEST_STEP:
+        toward = cf.continue_orbit(start, "zeta", (0.0, 0.03), max_step=step)
+        found = [e.params["zeta"] for e in toward.bifurcations if e.kind is Kind.T]
+        assert found == pytest.approx(touches, abs=1e-10) or found[::-1] == pytest.approx(
+            touches, abs=1e-10
+        )
+        symmetric = next(b for b in diagram.branches if b.symmetric and not b.bridge)
+        away = cf.explore(symmetric[5], "zeta", (0.0, 0.03), max_step=step, max_branches=4)
+        assert any(
+            abs(e.params["zeta"] - t) < 1e-10
+            for t in touches
+            for e in away.bifurcations
+            if e.kind is Kind.T
+        )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_event_has_the_names_of_all_changes_between_its_branches(seed):
+    """Each place has two outcomes, with a name for either way; brute force over all pairs of branches."""
+    rng = np.random.default_rng(seed)
+    places = int(rng.integers(1, 5))
+    ways = rng.choice([Kind.CS, Kind.SS, Kind.AS, Kind.GS], (places, 2))
+    forms = list(product((0, 1), repeat=places))
+    names = [
+        Name(ways[k][form[k]], frozenset([form]), frozenset([_changed(form, k)]))
+        for form in forms
+        for k in range(places)
+    ]
+    followed = {forms[i] for i in rng.choice(len(forms), rng.integers(1, len(forms) + 1))}
+    expected = {
+        ways[k][a[k]] for a, b in product(followed, repeat=2) for k in range(places) if a[k] != b[k]
+    }
+    assert kinds_between(names, followed) == expected
+
+
+def _changed(form, k):
+    return (*form[:k], 1 - form[k], *form[k + 1 :])
+
+
+def test_two_holds_that_change_together_have_one_name_from_every_branch():
+    bounds = (0.03, 0.045)
+    orbit = cf.find_orbit("coulomb", {**HOLDS, "h": 0.0, "zeta": 2.568e-5}, longest=1000)
+    diagram = cf.explore(orbit, "h", (-0.02, 0.06))
+    held = [b for b in diagram.branches if len(b.system.holds) == 2 and not b.mirrored]
+    assert held
+    for branch in held:
+        again = cf.explore(
+            branch[len(branch) // 2], "h", (-0.02, 0.06), max_step=STEP * LARGEST_STEP
+        )
+        assert [*differences(diagram, again), *differences(again, diagram)] == []
+    assert any(bounds[0] < e.params["h"] < bounds[1] for e in diagram.of_kind("GS"))
