@@ -219,7 +219,7 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
 
 
 def _touched_before(orbit: Orbit, location: EventFunction) -> bool:
-    """Tell whether a stick touches the limit at which a hold before it began, with a slide of no length between.
+    """Tell whether a stick touches the limit at which a hold before it began, after a slide of no length.
 
     The load has maxima of equal height. The slide moves away from the limit: beyond the event the second one
     is below it, and nothing is held there.
