@@ -204,7 +204,9 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
     check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
     if _touched_before(orbit, location):
-        raise NotationError(f"{reason}: its equal was touched before, and what is left of it slides")
+        raise NotationError(
+            f"{reason}: its equal was touched before, and what is left of it slides"
+        )
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
         left = (departs, left_surface(model, mode, departs))
