@@ -101,7 +101,11 @@ def _longest_way(
     stands = False
     # where curves cross joints are known to the root of what the parameter is known to
     known = max(SAME_SOLUTION, event.bifurcation.accuracy**0.5)
+    value = orbit.params[settings.parameter]
+    apart = ACCURACY if event.bifurcation.accuracy <= ACCURACY else np.inf
     for there, side in _ways(orbit, settings, first_step, progress, known):
+        if abs(side.first.value - value) > apart * settings.width:
+            continue  # it begins at another event, whose solution is nearly the same
         stands = stands or abs(side.first.slope) < _STANDS * settings.width
         if went_somewhere(side, event, settings) and (
             longest is None or side.length > longest[1].length

@@ -203,6 +203,10 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
         return Successor(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
     check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
+    if _touched_before(orbit, location):
+        raise NotationError(
+            f"{reason}: its equal was touched before, and what is left of it slides"
+        )
     still = first_zero_acceleration(orbit, i, touch[0], departs)
     if still is not None:
         left = (departs, left_surface(model, mode, departs))
@@ -214,6 +218,18 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
         edit = Edit(renamed={i: location.surface, j: TOUCH})
         return Successor(edit, {(j, -1): touch}, reason)
     return Successor(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+
+
+def _touched_before(orbit: Orbit, location: EventFunction) -> bool:
+    """Tell whether a stick touches the limit at which a hold before it began, after a slide of no length.
+
+    The load has maxima of equal height. The slide moves away from the limit: beyond the event the second one
+    is below it, and nothing is held there.
+    """
+    i, itinerary = location.segment, orbit.itinerary
+    slid = orbit.durations[i - 1] < NEARLY_NO_LENGTH * time_unit(orbit)
+    touched = itinerary[i - 2][1] == TOUCH and itinerary[i - 3][1] == location.surface
+    return bool(len(itinerary) > 3 and slid and touched)
 
 
 def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:

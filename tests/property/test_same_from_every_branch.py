@@ -127,3 +127,37 @@ def test_two_holds_that_change_together_have_one_name_from_every_branch():
         )
         assert [*differences(diagram, again), *differences(again, diagram)] == []
     assert any(bounds[0] < e.params["h"] < bounds[1] for e in diagram.of_kind("GS"))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 5, 7, 8])
+def test_nothing_is_held_at_the_second_of_two_equal_maxima(seed):
+    """Rest through both meets an AS: a slide after the first one leaves the load below the second one."""
+    rng = np.random.default_rng(seed)
+    near = {"Omega": 0.19073341966320848, "S": 0.18, "S0": 0.9042822380372987}
+    near |= {"h": 0.40181602459629007, "zeta": 2.8374848045155377e-07}
+    params = {name: value * rng.uniform(0.97, 1.03) for name, value in near.items()}
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    diagram = cf.explore(orbit, "S", (0.14, 0.21), max_branches=60)
+    assert diagram.of_kind("AS") and not diagram.loose_ends
+    assert diagram.verify(3).passed
+
+
+@pytest.mark.parametrize("seed", [1, 4, 5, 7, 9])
+def test_branches_begin_at_their_events_where_two_have_nearly_the_same_solution(seed):
+    """With nearly equal friction limits holds last a moment: Newton's method finds what begins next to it."""
+    rng = np.random.default_rng(seed)
+    near = {"Omega": 0.10107089480900815, "S": 0.0889656667920143}
+    near |= {"h": 0.1277389169773503, "zeta": 0.0015}
+    params = {name: value * rng.uniform(0.99, 1.01) for name, value in near.items()}
+    params["S0"] = params["S"] * (1.0 + 10.0 ** rng.uniform(-3.6, -2.8))
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    diagram = cf.explore(orbit, "zeta", (-0.03, 0.03), max_branches=100)
+    begun = [
+        (value, end.bifurcation.params["zeta"])
+        for branch in diagram.branches
+        for value, end in zip(branch.values[[0, -1]], branch.ends, strict=True)
+        if end.bifurcation is not None
+    ]
+    assert len(begun) > 8 and not diagram.loose_ends
+    for value, event in begun:
+        assert value == pytest.approx(event, abs=1e-8 * diagram.width)
