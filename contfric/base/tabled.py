@@ -19,12 +19,18 @@ if TYPE_CHECKING:
 Columns: TypeAlias = dict[str, NDArray[Any]]
 
 
-def as_table(columns: Any) -> pd.DataFrame:
-    """Return columns by their names, or rows, as a table (needs pandas)."""
+def as_table(columns: Any, origins: Iterable[tuple[str, str]] = ()) -> pd.DataFrame:
+    """Return columns by their names, or rows, as a table (needs pandas).
+
+    Its ``attrs["origins"]`` say what states are measured from, if it is not zero.
+    """
     need_pandas()
     import pandas as pd
 
-    return pd.DataFrame(columns)
+    table = pd.DataFrame(columns)
+    if found := dict(origins):
+        table.attrs["origins"] = found
+    return table
 
 
 def stacked(parts: Iterable[tuple[dict[str, Any], pd.DataFrame]]) -> pd.DataFrame:
@@ -37,7 +43,9 @@ def stacked(parts: Iterable[tuple[dict[str, Any], pd.DataFrame]]) -> pd.DataFram
         for k, (name, value) in enumerate(labels.items()):
             table.insert(k, name, value)
         tables.append(table)
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+    whole = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+    whole.attrs |= tables[0].attrs if tables else {}
+    return whole
 
 
 class Tabled(Shown):

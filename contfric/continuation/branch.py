@@ -345,7 +345,7 @@ class Branch(Shown):
         columns |= {q.name: self.quantity(q.asked) for q in columns_asked(quantities, self.model)}
         if self.stable is not None:
             columns["stable"] = self.stable
-        return as_table(columns)
+        return as_table(columns, self.model.origins)
 
     def plot(self, ax: Axes | None = None, row: QuantityLike = "x_max") -> Axes:
         """Draw one quantity of the branch against its parameter."""

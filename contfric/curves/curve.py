@@ -250,7 +250,7 @@ class Curve(Shown):
         orbits = list(self)
         columns["x_max"] = [orbit.x_max for orbit in orbits]
         columns["x_min"] = [orbit.x_min for orbit in orbits]
-        return as_table(columns)
+        return as_table(columns, self.model.origins)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the curve in its plane, dashed where no stable orbit is bounded."""

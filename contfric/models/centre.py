@@ -54,7 +54,9 @@ def centred(data: dict[str, Any]) -> dict[str, Any]:
                 f"the symmetry leaves no {s} where it is: applied twice, it is still a shift",
             )
     rest = _at_rest(data)
-    origins = {s: f"0.5*({rest.text(images[s])})" for s, shift in shifts.items() if shift}
+    origins = {
+        s: _half(shift) or f"0.5*({rest.text(images[s])})" for s, shift in shifts.items() if shift
+    }
     found = measured({k: v for k, v in data.items() if k != "symmetry"}, {}, origins)
     linear = {s: _text(row, states) for s, row in rows.items()}
     return found | {"symmetry": {**images, **linear}, APPLIED: origins}
@@ -91,6 +93,21 @@ def _at_rest(data: Mapping[str, Any]) -> Substitution:
     for name, text in data["define"].items():
         known[name] = f"({Substitution(known).text(text)})"
     return Substitution(known)
+
+
+def _half(shift: Coefficient) -> str:
+    """Return half of a shift as an expression; nothing if it has functions of parameters."""
+    terms = []
+    for powers, factor in shift.parts:
+        if any(atom.of for atom, _ in powers):
+            return ""
+        names = [atom.name if n == 1 else f"{atom.name}**({n})" for atom, n in powers]
+        size = [repr(abs(factor)).removesuffix(".0")] if abs(factor) != 1.0 or not names else []
+        terms.append((factor < 0.0, "*".join([*size, *names])))
+    terms.sort(key=lambda term: term[0])  # what is added comes first
+    text = "".join(f" {'-' if minus else '+'} {term}" for minus, term in terms)
+    text = f"-{text[3:]}" if terms[0][0] else text[3:]
+    return f"({text})/2" if len(terms) > 1 else f"{text}/2"
 
 
 def _text(row: tuple[float, ...], states: list[str]) -> str:

@@ -362,7 +362,7 @@ class Orbit(MeasuredOrbit):
         """Return one period as a table: t, the states, the domain (needs pandas)."""
         times, states, names = self.trajectory(points)
         columns = dict(zip(self.model.states, states.T, strict=True))
-        return as_table({"t": times, **columns, "domain": names})
+        return as_table({"t": times, **columns, "domain": names}, self.model.origins)
 
     def certify(self, *, time_limit: float | None = None) -> Certificate:
         """Prove that the orbit exists, is alone, admissible, stable or not (needs python-flint).

@@ -154,7 +154,7 @@ class Trajectory(Shown):
 
     def to_dataframe(self, points: int = 1000) -> pd.DataFrame:
         """Return t, states, mode and event, at all events and ``points`` times between (needs pandas)."""
-        return as_table(self.columns(points))
+        return as_table(self.columns(points), self.model.origins)
 
     def columns(self, points: int = 1000) -> dict[str, Any]:
         """Return the columns of :meth:`to_dataframe` without pandas."""

@@ -84,6 +84,10 @@ def stacked(tables: Sequence[Columns]) -> Columns:
 
 def points_of(x: Exported) -> Columns:
     """Return the points of a result: one period of an orbit; else one row an orbit."""
+    return _from_origins(_points(x), x.model)
+
+
+def _points(x: Exported) -> Columns:
     if isinstance(x, Orbit):
         return _motion(x)
     if isinstance(x, Branch):
@@ -106,6 +110,11 @@ def points_of(x: Exported) -> Columns:
 
 def events_of(x: Exported) -> Columns | None:
     """Return the events of a branch, a diagram or an ensemble, or the special points of curves; else None."""
+    table = _events(x)
+    return None if table is None else _from_origins(table, x.model)
+
+
+def _events(x: Exported) -> Columns | None:
     if isinstance(x, Equilibria):
         return stacked([_event_at_rest(event) for event in x.events])
     if isinstance(x, Orbit | Tabled | Trajectory):
@@ -131,6 +140,17 @@ def events_of(x: Exported) -> Columns | None:
     table.add("label", np.array([point.name for point in special], dtype=np.str_))
     for name in x.parameters:
         table.add(name, [point.params[name] for point in special], 1.0)
+    return table
+
+
+def _from_origins(table: Columns, model: Model) -> Columns:
+    """Add to the units of states, and of their extrema and stops, what they are measured from if not 0."""
+    origins = dict(model.origins)
+    for name in table.units if origins else ():
+        of_first = name in ("x_max", "x_min") or name.startswith("stop_")
+        origin = origins.get(model.states[0] if of_first else name)
+        if origin is not None:
+            table.units[name] += f" from {origin}"
     return table
 
 

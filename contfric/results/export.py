@@ -24,8 +24,9 @@ def export(x: Exported, path: str | Path) -> tuple[Path, ...]:
 
     A file that ends with ``.mat`` has structures ``points`` and ``events`` of columns, ``units`` of both,
     ``model``, and of an orbit its parameters, signature, period, multipliers and joints. One that ends with
-    ``.csv`` has the points: a row of names, a row of units (what 1 is, in units of the model's file; empty
-    for text), then one row a point; ``NAME-events.csv`` next to it has the events. What contfric itself
+    ``.csv`` has the points: a row of names, a row of units (what 1 is, in units of the model's file, and
+    what a shifted state is measured from; empty for text), then one row a point; ``NAME-events.csv`` next to
+    it has the events. What contfric itself
     reads again is written by :func:`contfric.save`.
 
     Returns

@@ -164,3 +164,48 @@ def test_a_picture_says_from_where_a_state_is_measured() -> None:
         "from"
         not in row_of("period", model).label + row_of("x_max", cf.load_model("coulomb")).label
     )
+
+
+@pytest.mark.parametrize(
+    ("shift", "half"),
+    [
+        ("c", "(Sm - Sp)/2"),
+        ("Sm - Sp - 0", "(Sm - Sp)/2"),
+        ("-more", "-more/2"),
+        ("0.4", "0.4/2"),
+        ("2*Sm*more - Sp/zeta + 1", "(1 + 2*Sm*more - Sp*zeta**(-1))/2"),
+        ("sqrt(Sm)", "0.5*(sqrt(Sm)-0)"),
+    ],
+)
+def test_what_a_state_is_measured_from_is_shown_as_one_would_write_it(
+    shift: str, half: str
+) -> None:
+    data = yaml.safe_load(DIRECTED)
+    for name in ("surfaces", "modes"):
+        del data[name]
+    data |= {"surfaces": {"v": {"observable": "v", "level": 0, "sliding": "filippov"}}}
+    data |= {"field": {"x": "v", "v": f"{shift} - 2*x - 0.1*v - sign(v) + 3*cos(Omega*t)"}}
+    data |= {"modes": {"forward": {"in": {"v": "+"}}, "backward": {"in": {"v": "-"}}}}
+    model = from_data(
+        loaded(data | {"symmetry": f"x -> {shift} - x, v -> -v, t -> t + T/2"}, Path())
+    )
+    assert dict(model.origins)["x"].replace(" ", "") == half.replace(" ", "")
+    at = {"Sp": 0.31, "Sm": 0.17, "more": 0.7, "zeta": 0.05}
+    known = at | {"c": at["Sm"] - at["Sp"], "sqrt": np.sqrt}
+    assert eval(dict(model.origins)["x"], known) == pytest.approx(
+        0.5 * eval(shift, known), abs=1e-15
+    )
+
+
+def test_tables_and_files_say_from_where_a_state_is_measured(tmp_path: Path) -> None:
+    model = model_of(DIRECTED)
+    origin = dict(model.origins)["x"]
+    orbit = cf.find_orbit(model, {"zeta": 0.05})
+    branch = cf.continue_orbit(orbit, "Omega", (0.49, 0.51))
+    for table in (orbit.to_dataframe(), branch.to_dataframe()):
+        assert table.attrs["origins"] == {"x": origin}
+    cf.export(branch, tmp_path / "branch.csv")
+    names, units = (tmp_path / "branch.csv").read_text().splitlines()[:2]
+    said = dict(zip(names.split(","), units.split(","), strict=True))
+    assert said["x_max"] == said["stop_1"] == f"1 from {origin}"
+    assert "from" not in said["period"] + said["Omega"]
