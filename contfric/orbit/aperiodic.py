@@ -20,6 +20,7 @@ from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
 from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
 from contfric.orbit.starts import left_through
+from contfric.orbit.structure import open_ends
 from contfric.orbit.time_scale import clock_period
 
 #: Longest period that is looked for, in periods of the excitation.
@@ -35,6 +36,8 @@ _TURNS = 8
 #: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
 #: part by a larger factor than quasi-periodic ones, in proportion to time, could.
 _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
+#: A simulation that ends on a surface is on it to rounding, or a little more at a small angle.
+_ON = 1e-9
 
 
 def affordable(model: Model, done: int, events: int) -> int:
@@ -181,6 +184,10 @@ def left_region(trajectory: Trajectory) -> str:
     model, (_, time, state, mode) = trajectory.model, trajectory.last
     vector = model.vector(trajectory.params)
     surface = mode and left_through(model, mode, time, state, vector)
+    if mode and not surface and not model.composed:
+        flow, size = model.view(vector), _ON * (1.0 + float(np.max(np.abs(state))))
+        ends = (s for s in open_ends(model, mode) if abs(flow.height(s, time, state)) < size)
+        surface = next(ends, "")
     if not surface:
         return ""
     return (

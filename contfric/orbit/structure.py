@@ -29,18 +29,22 @@ def cut_bounds(model: Model) -> Mapping[str, tuple[str, ...]]:
     """Surfaces that bound each mode as it was declared, sections among them: a simulation stops there."""
     if isinstance(model, ComposedModel):
         return Made(model.cuts_of, model.composition.is_mode)
-    found = _bounds(model, {d.name: d.own_mode for d in model.domains})
-    return {mode: (*bounds, *_open_ends(model, mode, bounds)) for mode, bounds in found.items()}
+    return {mode: (*bounds, *open_ends(model, mode)) for mode, bounds in _met(model).items()}
 
 
-def _open_ends(model: Model, mode: str, bounds: tuple[str, ...]) -> tuple[str, ...]:
+@cache
+def _met(model: Model) -> dict[str, tuple[str, ...]]:
+    """Return the surfaces at which each mode as it was declared is mapped, or left for another one."""
+    return _bounds(model, {d.name: d.own_mode for d in model.domains})
+
+
+def open_ends(model: Model, mode: str) -> tuple[str, ...]:
     """Return surfaces that a mode lies on one side of, with nothing behind: a solution ends there.
 
     Not those behind another level of the same observable, which is met first.
     """
-    own = [d for d in model.domains if d.own_mode == mode]
-    found = []
-    for surface in (s.name for s in model.surfaces if s.name not in bounds):
+    own, found = [d for d in model.domains if d.own_mode == mode], []
+    for surface in (s.name for s in model.surfaces if s.name not in _met(model)[mode]):
         sides = {d.signs[surface] for d in own}
         if surface in model.settled_sides or len(sides) != 1 or sides == {0}:
             continue

@@ -82,6 +82,8 @@ def test_a_solution_ends_where_its_sliding_mode_does_and_nothing_follows(
     assert motion.last[3] == "s"
     phase = math.acos(x - limit) / 0.5  # cos(w t) = x - S0
     assert motion.last[1] == pytest.approx(phase, abs=1e-12)
+    with pytest.raises(cf.ConvergenceError, match=r"has left the region of 's' at 'F[+-]'"):
+        cf.find_orbit(file, {"S0": limit}, state=[x, 0.0])
     sweep = cf.sweep(file, "w", [0.45, 0.5, 0.55], {"S0": limit}, periods=20)
     basins = cf.basins(file, {"x": np.linspace(-1, 1, 3), "v": [0.0, 0.4]}, {"S0": limit})
     for text in (str(sweep), str(basins)):

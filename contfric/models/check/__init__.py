@@ -43,6 +43,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     """
     from contfric.models.check.continuity import (
         check_continuity,
+        check_jumps_through,
         check_kinks_in_time,
         check_reset_jumps,
     )
@@ -58,7 +59,8 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     )
     from contfric.models.check.passages import check_passages, check_slides
     from contfric.models.check.probe import Probe
-    from contfric.models.check.scales import check_reached, check_scales
+    from contfric.models.check.reached import check_reached
+    from contfric.models.check.scales import check_scales
     from contfric.models.check.structure import (
         check_angles,
         check_period,
@@ -81,9 +83,9 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_transitions(report, probe)
     check_slides(report, probe)
     check_passages(report, probe)
-    check_reached(report, probe)
     check_resets(report, probe)
     check_continuity(report, probe)
+    check_jumps_through(report, probe)
     check_kinks_in_time(report, probe)
     check_reset_jumps(report, probe)
     check_kinks(report, loaded)
@@ -95,5 +97,6 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_hidden(report, probe)
     check_period(report, probe)
     check_angles(report, probe)
+    check_reached(report, probe)
     check_scales(report, probe)
     return report

@@ -31,6 +31,9 @@ _LOOKED_INTO, _LEFT = 1e-4, 1e-6
 #: Halvings: to the resolution of the arithmetic.
 _HALVINGS = 52
 
+#: This share of a line beside a jump is on one side of it, and near it.
+_ASIDE = 1e-9
+
 #: A line in a mode: its point (t, y) at a place.
 Line = Callable[[float], tuple[float, FloatArray]]
 Sides = frozenset[tuple[str, int]]
@@ -66,6 +69,46 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
                 "as sin(2*pi*t/T) that changes its sign there)",
             )
             return
+
+
+def check_jumps_through(report: ModelReport, probe: Probe) -> None:
+    """Check that no observable jumps through the level of its surface: such a crossing is not located."""
+    for surface in _may_jump(probe):
+        for t, y in probe.states(_STATES):
+            lines = (partial(_at_state, t, y, k) for k in range(len(y)))
+            ends = zip(*probe.model.region(probe.vector, 2.0), strict=True)
+            for name, line, (low, high) in zip(probe.model.states, lines, ends, strict=True):
+                report.count(Topic.CONTINUITY)
+                found = jump_along(partial(_height_on, probe, surface, line), low, high)
+                if found is None or not math.isfinite(found[2]):
+                    continue
+                step = _ASIDE * (high - low)
+                sides = [probe.height(surface, *line(found[1] + s * step)) for s in (-1.0, 1.0)]
+                if sides[0] * sides[1] < 0.0:
+                    report.error(
+                        Topic.CONTINUITY,
+                        f"the observable of '{surface}' jumps by {found[2]:.3g} through its level along "
+                        f"{name}, at {probe.shown(*line(found[1]))}: no solution is ever on that surface. "
+                        "Use an observable that is continuous and vanishes there",
+                    )
+                    return
+
+
+def _may_jump(probe: Probe) -> list[str]:
+    """Return the surfaces whose observables are not made of continuous functions."""
+    if not probe.model.definition:
+        return [s.name for s in probe.model.surfaces]
+    from contfric.models.formulas import cannot_jump
+    from contfric.models.symbols import Formulas
+
+    formulas = Formulas(from_text(probe.model.definition))
+    moving = (formulas.t, *formulas.y)
+    return [name for name, h in formulas.heights().items() if not cannot_jump(h, moving)]
+
+
+def _height_on(probe: Probe, surface: str, line: Line, place: float) -> FloatArray:
+    """Return (observable - level) of a surface at a place of a line, whatever mode holds there."""
+    return np.array([probe.height(surface, *line(place))])
 
 
 def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:

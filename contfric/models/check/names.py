@@ -97,11 +97,16 @@ def check_kinks(report: ModelReport, model: Model) -> None:
     symbols = (*formulas.y, *formulas.p)
     names = dict(zip(symbols, (*model.states, *model.parameter_names), strict=True))
     modes = [mode for mode in model.modes for _ in formulas.pieces]
+    said = set[tuple[str, ...]]()  # the parts of a mode that a section divides have one field
     for mode, field in zip(modes, formulas.fields(), strict=True):
         for state, rate in zip(model.states, field, strict=True):
             report.count(Topic.KINKS)
             for kink in kinks_in(rate, (formulas.t, *formulas.y)):
                 text = kink.subs({s: Symbol(name) for s, name in names.items()})
+                key = model.whole_mode(mode.name), state, str(text)
+                if key in said:
+                    continue
+                said.add(key)
                 report.warn(
                     Topic.KINKS,
                     f"the rate of '{state}' in mode '{mode.name}' has a kink where {text} = 0, which no "

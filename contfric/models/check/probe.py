@@ -19,7 +19,7 @@ _STEPS = 30
 #: On a surface: rounding of an observable of size 1.
 ON = 1e-12
 #: Modes up to which each is looked at in as many states as one mode alone is.
-_FEW_MODES = 9
+FEW_MODES = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Probe:
 
     def share(self, states: int) -> int:
         """Return in how many states each mode is looked at: of many modes in fewer."""
-        return max(1, states * _FEW_MODES // max(_FEW_MODES, len(self.model.modes)))
+        return max(1, states * FEW_MODES // max(FEW_MODES, len(self.model.modes)))
 
     def height(self, surface: str, t: float, y: FloatArray) -> float:
         """Return (observable - level) of a surface."""

@@ -1,4 +1,4 @@
-"""Whether solutions come to states at which a model is at fault: a few simulations tell.
+"""Whether solutions come into every mode, and to states at which a model is at fault: simulations tell.
 
 States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
 simulation meets such a fault, else a warning.
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.errors import ContfricError
-from contfric.models.check.probe import Probe
+from contfric.models.check.probe import FEW_MODES, Probe
 from contfric.models.check.report import ModelReport, Topic
 
 if TYPE_CHECKING:
@@ -47,14 +47,70 @@ def report_fault(report: ModelReport, probe: Probe, topic: Topic, message: str) 
         )
 
 
+def check_reached(report: ModelReport, probe: Probe) -> None:
+    """Check that motion can come into every mode from another one, and say where no simulation does."""
+    model = probe.model
+    typed = {d.name: model.domain_by_name[model.shown(d.name)].own_mode for d in model.domains}
+    modes = dict.fromkeys(typed.values())
+    if len(modes) == 1:
+        return
+    # what is wrong is said: then simulations tell nothing
+    unvisited = _unvisited(probe) if report.ok else set()
+    for mode in modes:
+        report.count(Topic.REACHED)
+        entered = any(
+            typed[source] != mode and any(typed[target] == mode for target in targets)
+            for (source, _), targets in model.targets.items()
+        )
+        if not entered:
+            report.warn(
+                Topic.REACHED,
+                f"nothing leads into mode '{mode}' from another one: a solution is in it only if it starts "
+                "there. Correct the sides of the modes, or lead a reset to it ('to: ...')",
+            )
+        elif mode in unvisited:
+            report.note(
+                Topic.REACHED,
+                f"none of {len(_motions(probe))} simulations came into mode '{mode}' at these parameters. If "
+                "some should, correct its sides, or the surface or reset that leads to it",
+            )
+
+
+def _unvisited(probe: Probe) -> set[str]:
+    """Return the modes that no simulation comes into.
+
+    None of many, which are combinations of contacts, and none that is derived: nobody meant it to be visited.
+    """
+    model = probe.model
+    motions = _motions(probe) if len(model.modes) <= FEW_MODES else ()
+    if not motions:
+        return set()
+    visited = {m.last[3] for m in motions if m.last[3] and len(m.modes)}
+    visited |= {model.modes[k].name for motion in motions for k in np.unique(motion.modes[1:])}
+    joined = {model.whole_mode(name) for name in visited}
+    derived = {m.name for m in model.modes if m.sliding and m.name.startswith("slide")}
+    return {m.name for m in model.modes if model.whole_mode(m.name) not in joined} - derived
+
+
 @lru_cache(maxsize=1)  # the same simulations for every fault of a model
 def _ends(probe: Probe) -> tuple[bool, ...]:
     """Return of each simulation whether it came to where motion cannot go on; nothing if none could start."""
-    from contfric.orbit.simulation import SimulationEnd, simulate
+    from contfric.orbit.simulation import SimulationEnd
+
+    return tuple(
+        motion.end is SimulationEnd.IMPOSSIBLE or _is_outside(probe, motion)
+        for motion in _motions(probe)
+    )
+
+
+@lru_cache(maxsize=1)
+def _motions(probe: Probe) -> tuple[Trajectory, ...]:
+    """Return simulations from the start by default, and from states that are drawn."""
+    from contfric.orbit.simulation import simulate
 
     model, draw = probe.model, np.random.default_rng(probe.seed)
     low, high = model.region(probe.vector)
-    found: list[bool] = []
+    found: list[Trajectory] = []
     for k in range(_STARTS):
         state = None if k == 0 else draw.uniform(low, high)
         try:
@@ -63,7 +119,7 @@ def _ends(probe: Probe) -> tuple[bool, ...]:
             )
         except ContfricError:  # beyond a wall, or in no domain
             continue
-        found.append(motion.end is SimulationEnd.IMPOSSIBLE or _is_outside(probe, motion))
+        found.append(motion)
     return tuple(found)
 
 

@@ -1,4 +1,4 @@
-"""Modes that nothing leads into, and states whose sizes and times are far apart."""
+"""States whose sizes and times are far apart, or far from 1."""
 
 from __future__ import annotations
 
@@ -23,27 +23,6 @@ _NO_FORCE = 1e-12
 _PHASES = 16
 
 
-def check_reached(report: ModelReport, probe: Probe) -> None:
-    """Check that motion can come into every mode from another one."""
-    model = probe.model
-    typed = {d.name: model.domain_by_name[model.shown(d.name)].own_mode for d in model.domains}
-    modes = dict.fromkeys(typed.values())
-    if len(modes) == 1:
-        return
-    for mode in modes:
-        report.count(Topic.REACHED)
-        entered = any(
-            typed[source] != mode and any(typed[target] == mode for target in targets)
-            for (source, _), targets in model.targets.items()
-        )
-        if not entered:
-            report.warn(
-                Topic.REACHED,
-                f"nothing leads into mode '{mode}' from another one: a solution is in it only if it starts "
-                "there. Correct the sides of the modes, or lead a reset to it ('to: ...')",
-            )
-
-
 def check_scales(report: ModelReport, probe: Probe) -> None:
     """Check that states are of sizes, and change in times, that are not too far apart."""
     model = probe.model
@@ -65,6 +44,12 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
         for state, width, rate in zip(model.states, widths, fastest, strict=True)
         if rate > 0.0 and width > 0.0
     }
+    _apart(
+        report,
+        times,
+        "times of change ('spread' over the largest rate)",
+        "give their sizes in 'spread'",
+    )
     typical = min(times.values(), key=lambda v: abs(math.log(v)), default=1.0)
     _propose_units(report, probe, sizes, typical)
 
@@ -121,12 +106,17 @@ def _forced_sizes(probe: Probe) -> dict[str, float]:
     moving = [mode.name for mode in model.modes if not mode.sliding]
     if not probe.period or not moving:
         return {}
+    from scipy.linalg import matrix_balance
+
     rest = np.zeros(n)
     fields = [probe.field(moving[0], k * probe.period / _PHASES, rest) for k in range(_PHASES)]
+    columns = [probe.field(moving[0], 0.0, e) for e in np.eye(n)]
+    if not np.all(np.isfinite([*fields, *columns])):
+        return {}
     force = np.max(np.abs(np.array(fields) - np.mean(fields, axis=0)), axis=0)
-    columns = [probe.field(moving[0], 0.0, e) - fields[0] for e in np.eye(n)]
-    system = 1j * math.tau / probe.period * np.eye(n) - np.array(columns).T
-    if not (np.all(np.isfinite(system)) and np.linalg.cond(system) < 1e12):
+    system = 1j * math.tau / probe.period * np.eye(n) - (np.array(columns) - fields[0]).T
+    balanced, _ = matrix_balance(system, permute=False)  # whatever the units are
+    if not np.linalg.cond(balanced) < 1e12:
         return {}
     return dict(zip(model.states, np.abs(np.linalg.solve(system, force)).tolist(), strict=True))
 

@@ -17,6 +17,9 @@ from contfric.models.definition import Domain, FloatArray, Model, Reset, Surface
 _ON_SURFACE, _EVERYWHERE = 200, 400
 #: With a gradient this small a place on the surface is known to 1e-6 only (12 digits of the observable).
 _FLAT = 1e-6
+#: At a double root a place is known to 1e-6, and so is the gradient: this far beside it is a thousand times
+#: larger. That of a surface which is crossed is not a hundred times larger there.
+_BESIDE, _VANISHES = 1e-3, 1e-2
 #: A rate this small is one that rounding has made.
 _STILL = 1e-9
 #: Rounding of values that should be the same, relative to 1 + their size.
@@ -32,7 +35,7 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
         for t, y in probe.on(surface.name, _ON_SURFACE // 4):
             reached += 1
             report.count(Topic.SURFACES)
-            if not np.abs(probe.slope(surface.name, t, y)).max() > _FLAT:
+            if _is_flat(probe, surface.name, t, y):
                 report.error(
                     Topic.SURFACES,
                     f"the gradient of '{surface.observable}' vanishes on surface '{surface.name}' at "
@@ -46,6 +49,17 @@ def check_surfaces(report: ModelReport, probe: Probe) -> None:
                 f"no state was found on surface '{surface.name}' ({surface.observable} = "
                 f"{surface.level}): if solutions reach it, enlarge 'spread'; else leave it out",
             )
+
+
+def _is_flat(probe: Probe, surface: str, t: float, y: FloatArray) -> bool:
+    """Tell whether the gradient vanishes on a surface near a place, which is on it to 12 digits only."""
+    slope = probe.slope(surface, t, y)
+    size = float(np.abs(slope).max())
+    if not size > _FLAT:
+        return True
+    step = _BESIDE * slope / np.linalg.norm(slope)
+    beside = [probe.slope(surface, t + s * step[0], y + s * step[1:]) for s in (1.0, -1.0)]
+    return size < _VANISHES * float(np.abs(beside).max())
 
 
 def _ends_derived(model: Model, surface: Surface) -> bool:
@@ -156,11 +170,11 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                 continue
             if following is None and name in entered:
                 entered = entered_domains(model, _made(probe))
-            if following is None and name not in entered:
+            if following is None and entered and name not in entered:
                 report.note(
                     Topic.TRANSITIONS,
                     f"a solution that starts in '{name}' meets '{surface.name}' and no domain follows: "
-                    f"{_sides(signs)}. Nothing else leads there",
+                    f"{_sides(model, signs)}. Nothing else leads there",
                 )
                 return
             if following is None:
@@ -169,7 +183,7 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
                     probe,
                     Topic.TRANSITIONS,
                     f"a solution in '{name}' meets '{surface.name}' at {probe.shown(t, y)}, and no "
-                    f"domain follows: {_sides(signs)}. Add a mode with {surface.name}: 0 there (it "
+                    f"domain follows: {_sides(model, signs)}. Add a mode with {surface.name}: 0 there (it "
                     "stays), or one on the other side",
                 )
                 return
@@ -253,7 +267,9 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
         if all(d.signs[s] == v for s, v in signs.items() if s not in reset.lands)
     ]
     if not fits:
-        return f"{where} is in no domain: {_sides(signs)}. Add a mode that holds there{passes}"
+        return (
+            f"{where} is in no domain: {_sides(model, signs)}. Add a mode that holds there{passes}"
+        )
     for surface in (s for s, side in reset.lands.items() if side != 0):
         rate, mode = probe.rate(fits[0].own_mode, surface, t, behind), fits[0].own_mode
         if not max(d.signs[surface] * rate for d in fits if d.own_mode == mode) > 0.0:
@@ -361,6 +377,6 @@ def check_angles(report: ModelReport, probe: Probe) -> None:
                     return
 
 
-def _sides(signs: dict[str, int]) -> str:
-    words = {1: "above", -1: "below", 0: "on"}
-    return ", ".join(f"{words[side]} {name}" for name, side in signs.items())
+def _sides(model: Model, signs: dict[str, int]) -> str:
+    words, own = {1: "above", -1: "below", 0: "on"}, signs.keys() - model.section_surfaces
+    return ", ".join(f"{words[side]} {name}" for name, side in signs.items() if name in own)
