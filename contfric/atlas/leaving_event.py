@@ -171,11 +171,11 @@ def _leave_beside(
             if point is None:
                 continue
             there = point.orbit(orbit, active)
-            if not _is_beside(there, moved, orbit):
+            if not (_is_beside(there, moved, orbit) and there.admissible):
                 continue
             point, origin = start_beside(orbit, point, settings, away)
             side = _trace(there, point, settings, _NEAR_EVENT[0], state.progress)
-            if there.admissible and side.count > 1:
+            if side.count > 1:
                 _end_where_it_began(side, origin, event, settings)
                 first = first_end(EndReason[event.bifurcation.kind.name], event, side, settings)
                 return assemble(there, settings, side, first, origin)

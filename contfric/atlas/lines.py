@@ -45,8 +45,8 @@ def ways_in_plane(orbit: Orbit, active: int) -> Iterator[tuple[FloatArray, float
 
 def _lines(orbit: Orbit, active: int, vectors: FloatArray, slopes: FloatArray) -> FloatArray | None:
     """Return the angles in the plane of two null vectors at which curves leave; None if that is not clear."""
-    _, by_joints, by_parameters = equations_at(orbit.system, orbit.joints, orbit.vector)
-    full = np.hstack([by_joints, by_parameters[:, [active]]])
+    _, *columns = equations_at(orbit.system, orbit.joints, orbit.vector, (active,))
+    full = np.hstack(columns)
     left = np.linalg.svd(full)[0][:, -1]
     form = [
         _bent(orbit, active, left, c * vectors[0] + s * vectors[1], c * slopes[0] + s * slopes[1])
@@ -72,6 +72,6 @@ def _bent(orbit: Orbit, active: int, left: FloatArray, along: FloatArray, slope:
     for step in (-_DIFFERENCE, 0.0, _DIFFERENCE):
         vector = orbit.vector.copy()
         vector[active] += step * slope
-        residual = equations_at(orbit.system, orbit.joints + step * along, vector, False)[0]
+        residual = equations_at(orbit.system, orbit.joints + step * along, vector)[0]
         total += float(left @ residual) * (-2.0 if step == 0.0 else 1.0)
     return total / _DIFFERENCE**2

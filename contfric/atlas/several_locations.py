@@ -137,10 +137,7 @@ def _effects(
     for freedom in freedoms:
         ahead, back = (
             left
-            @ (
-                equations_at(orbit.system, orbit.joints + step * freedom, orbit.vector, False)[0]
-                - start
-            )
+            @ (equations_at(orbit.system, orbit.joints + step * freedom, orbit.vector)[0] - start)
             for step in (_STEP, -_STEP)
         )
         even, odd = 0.5 * (ahead + back), 0.5 * (ahead - back)

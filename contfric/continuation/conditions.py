@@ -103,8 +103,8 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
     form, parted = _without_slides(form)
     orbit = form.orbit
     system, m = orbit.system, orbit.joints.shape[1]
-    a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector)
-    inner, outer = _columns(a, b, c[:, :, active], close)
+    a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector, (active,))
+    inner, outer = _columns(a, b, c[:, :, 0], close)
     left, size, right = np.linalg.svd(inner)
     rank = int(np.sum(size > _NULL * (size[0] if size.size else 1.0)))
     free = right[rank:]
@@ -181,7 +181,7 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
 
 def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
     """Return the residuals of all equations, shape (N m,)."""
-    return -linearised(orbit.system, joints, orbit.vector, parameters=False)[4]
+    return -linearised(orbit.system, joints, orbit.vector)[4]
 
 
 # ---------------------------------------------------------------------- the margins that vanish

@@ -249,8 +249,8 @@ class Line:
         before = np.inf
         for _ in range(_MOST_CORRECTIONS):
             joints, vector = self._split(x)
-            residual, on_joints, on_parameters = equations_at(self.orbit.system, joints, vector)
-            full[:size, :size], full[:size, size] = on_joints, on_parameters[:, self.active]
+            at = self.orbit.system, joints, vector
+            residual, full[:size, :size], full[:size, size:] = equations_at(*at, (self.active,))
             right = np.append(-residual, distance - along @ (x - start))
             try:
                 step = np.linalg.solve(full, right)

@@ -55,9 +55,9 @@ def _moved(
 
     ``wanted`` has the shares of the unknowns in that sum, joints and parameter.
     """
-    a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector)
+    a, b, c, close, residual = linearised(orbit.system, orbit.joints, orbit.vector, (active,))
     b[-1] = b[-1] @ close
-    weights = _weights(a, b, c[:, :, active], row, wanted)
+    weights = _weights(a, b, c[:, :, 0], row, wanted)
     if weights is None or not np.isfinite(weights).all():
         return None
     errors = np.abs(residual) + _rounding(orbit)

@@ -149,7 +149,7 @@ def family_near(orbit: Orbit, active: int, within: float = 1e-6) -> VerticalFami
 
 def _next_to(whole: Orbit, active: int, within: float) -> VerticalFamily | None:
     """Return the family next to an orbit on its whole period."""
-    by_joints = equations_at(whole.system, whole.joints, whole.vector, False)[1]
+    by_joints = equations_at(whole.system, whole.joints, whole.vector)[1]
     left, size, right = np.linalg.svd(by_joints)
     if size[-1] > _NEARLY * size[0]:
         return None
@@ -163,7 +163,7 @@ def _next_to(whole: Orbit, active: int, within: float) -> VerticalFamily | None:
     joints = _reduced(first, whole.vector, border)
     if joints is None:
         return None
-    residual, _, _ = equations_at(whole.system, joints, whole.vector, False)
+    residual, _, _ = equations_at(whole.system, joints, whole.vector)
     if not np.abs(residual).max() < _NEAR + within**2:  # it is c b^2 near an orbit of a family
         return None
     for distance in distances:
@@ -185,7 +185,9 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | Non
         joints = _reduced(orbit, vector, border)
         if joints is None:
             return None
-        residual, by_joints, by_parameters = equations_at(orbit.system, joints, vector)
+        residual, by_joints, by_parameters = equations_at(
+            orbit.system, joints, vector, range(len(vector))
+        )
         w, along = _null_vectors(by_joints, border)
         rates = w @ by_parameters
         scale = float(np.linalg.norm(by_parameters[:, active]))
@@ -247,7 +249,7 @@ def _reduced(orbit: Orbit, vector: FloatArray, border: Border) -> FloatArray | N
     """
     joints, before = orbit.joints, np.inf
     for _ in range(_STEPS):
-        residual, by_joints, _ = equations_at(orbit.system, joints, vector, False)
+        residual, by_joints, _ = equations_at(orbit.system, joints, vector)
         full = _bordered(by_joints, border)
         if not (np.isfinite(full).all() and np.isfinite(residual).all()):
             return None

@@ -274,7 +274,7 @@ def border_of(problem: Problem, joints: FloatArray, vector: FloatArray) -> Float
     border = np.zeros((2, *joints.shape))
     if problem.test is not None:
         return border
-    a, b, _, close = jacobian_blocks(problem.system, joints, vector, parameters=False)
+    a, b, _, close = jacobian_blocks(problem.system, joints, vector)
     count, m = joints.shape
     u, _, vh = np.linalg.svd(stacked(a, b, problem.condition.sign * close))
     border[0], border[1] = u[:, -1].reshape(count, m), vh[-1].reshape(count, m)

@@ -192,8 +192,9 @@ class Held:
 
     def in_plane(self, orbit: Orbit) -> FloatArray:
         """Return the shortest step to the orbits and the plane of them, scaled, shape (N m + q, 1 + q)."""
-        left, on_joints, on_parameters = equations_at(orbit.system, orbit.joints, orbit.vector)
-        jacobian = np.hstack([on_joints, on_parameters[:, self.which]]) * self.weights
+        at = orbit.system, orbit.joints, orbit.vector
+        left, on_joints, on_parameters = equations_at(*at, self.which)
+        jacobian = np.hstack([on_joints, on_parameters]) * self.weights
         if not (np.all(np.isfinite(jacobian)) and np.all(np.isfinite(left))):
             raise ConvergenceError("the equations of the orbit are not finite", orbit)
         basis, upper = np.linalg.qr(jacobian.T, mode="complete")

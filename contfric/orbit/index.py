@@ -82,7 +82,7 @@ def opening_signs(orbits: Sequence[Orbit]) -> list[int | None]:
     if not orbits or orbits[0].model.autonomous:
         return [None for _ in orbits]
     system = orbits[0].system
-    every = [jacobian_blocks(system, o.joints, o.vector, parameters=False) for o in orbits]
+    every = [jacobian_blocks(system, o.joints, o.vector) for o in orbits]
     a, b, close = (np.array([blocks[k] for blocks in every]) for k in (0, 1, 3))
     matrices = _matrix_of_turn(system, a, b, close, 1, -1.0)
     if matrices is None:  # an exit of one of them is tangential
@@ -92,7 +92,7 @@ def opening_signs(orbits: Sequence[Orbit]) -> list[int | None]:
 
 def _turn_sign(orbit: Orbit, times: int, sign: float) -> int | None:
     system = orbit.system
-    a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector, parameters=False)
+    a, b, _, close = jacobian_blocks(system, orbit.joints, orbit.vector)
     matrix = _matrix_of_turn(system, a[None], b[None], close[None], times, sign)
     return None if matrix is None else _signs(matrix)[0]
 

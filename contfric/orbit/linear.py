@@ -12,24 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.models.definition import FloatArray
-from contfric.orbit.system import System
+from contfric.orbit.system import IntArray, System
 
-#: No parameter.
-_NONE = np.empty(0, dtype=np.int64)
+#: Indices of the parameters by which equations are differentiated.
+Which = Sequence[int] | IntArray
 #: Singular values below this share of the largest are zero: at an event they are good to the root of rounding
 #: at worst.
 _NULL = 1e-7
 
 
 def jacobian_blocks(
-    system: System, joints: FloatArray, vector: FloatArray, parameters: bool | Sequence[int] = True
+    system: System, joints: FloatArray, vector: FloatArray, which: Which = ()
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the blocks on z_i, z_{i+1} and the parameters, and the closure.
+    """Return the blocks on z_i, z_{i+1} and some parameters, and the closure.
 
-    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). The third has all parameters, some or none:
+    Shapes (N, m, m), (N, m, m), (N, m, parameters) and (m, m). ``which`` are the indices of the parameters:
     most of the time goes to them where motion is integrated, or they are in the matrices of linear motion.
     """
-    a, b, c, close, _ = linearised(system, joints, vector, parameters)
+    a, b, c, close, _ = linearised(system, joints, vector, which)
     return a, b, c, close
 
 
@@ -37,7 +37,7 @@ def linearised(
     system: System,
     joints: FloatArray,
     vector: FloatArray,
-    parameters: bool | Sequence[int] = True,
+    which: Which = (),
     at_joints: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the blocks and, as the last one, what is left of every equation, shape (N m,).
@@ -50,13 +50,10 @@ def linearised(
 
     count, m = joints.shape
     a, b = np.empty((2, count, m, m))
-    chosen = range(len(vector)) if parameters is True else parameters
-    which = np.array(chosen, dtype=np.int64) if chosen else _NONE
-    c, r = np.empty((count, m, len(which))), np.empty((count, m, 1))
-    close = np.empty((m, m))
-    linearise(
-        system.functions(), system.layout, joints, vector, which, int(at_joints), a, b, c, r, close
-    )
+    chosen = np.array(which, dtype=np.int64)
+    c, r = np.empty((count, m, len(chosen))), np.empty((count, m, 1))
+    close, by = np.empty((m, m)), int(at_joints)
+    linearise(system.functions(), system.layout, joints, vector, chosen, by, a, b, c, r, close)
     return a, b, c, close, r.ravel()
 
 
@@ -64,20 +61,20 @@ def equations_at(
     system: System,
     joints: FloatArray,
     vector: FloatArray,
-    parameters: bool | Sequence[int] = True,
+    which: Which = (),
     at_joints: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals and Jacobians by joints and parameters: (N m,), (N m, N m), (N m, parameters).
+    """Return residuals and Jacobians by joints and some parameters: (N m,), (N m, N m), (N m, parameters).
 
     Where the equations do not hold these are the derivatives of the residuals only without ``at_joints``.
     """
-    a, b, c, close, correction = linearised(system, joints, vector, parameters, at_joints)
+    a, b, c, close, correction = linearised(system, joints, vector, which, at_joints)
     return -correction, stacked(a, b, close), c.reshape(joints.size, -1)
 
 
 def assembled(system: System, joints: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the Jacobian with respect to all joints, shape (N m, N m)."""
-    a, b, _, close = jacobian_blocks(system, joints, vector, parameters=False)
+    a, b, _, close = jacobian_blocks(system, joints, vector)
     return stacked(a, b, close)
 
 
@@ -163,7 +160,7 @@ def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> Fl
     from contfric.orbit.saltation import pass_when_due
     from contfric.orbit.turn import turn_pencil
 
-    a, b, _, _ = jacobian_blocks(system, joints, vector, parameters=False)
+    a, b, _, _ = jacobian_blocks(system, joints, vector)
     pass_when_due(system, joints, vector, a, b)
     pencil = np.empty((2, *a.shape[1:]))
     turn_pencil(a, b, pencil)

@@ -123,7 +123,9 @@ def test_the_gradient_of_a_multiplier_next_to_another_one() -> None:
 def test_joints_move_as_the_full_matrix_says(model: str) -> None:
     """One elimination, joint by joint, against a dense solve: excited, autonomous, and with impacts."""
     orbit = cf.find_orbit(model)
-    a, b, c, close = jacobian_blocks(orbit.system, orbit.joints, orbit.vector)
+    a, b, c, close = jacobian_blocks(
+        orbit.system, orbit.joints, orbit.vector, range(len(orbit.vector))
+    )
     full = -np.linalg.solve(stacked(a, b, close), c.reshape(orbit.joints.size, -1))
     moved = joint_sensitivities(orbit).reshape(full.shape)
     assert np.allclose(moved, full, rtol=1e-9, atol=1e-9 * np.max(np.abs(full)))

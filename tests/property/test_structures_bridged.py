@@ -85,4 +85,4 @@ def test_rest_where_a_gap_stands_still_is_held() -> None:
 
 
 def _equations(orbit: cf.Orbit, moved: Any = 0.0) -> np.ndarray:
-    return equations_at(orbit.system, orbit.joints + moved, orbit.vector, False)[0]
+    return equations_at(orbit.system, orbit.joints + moved, orbit.vector)[0]
