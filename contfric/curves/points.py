@@ -154,11 +154,10 @@ def returned(problem: Conditioned, start: Point, marched: Marched) -> int | None
     Around a resonance the phase of the solution turns once, and the same orbit is met a period later.
     """
     rows, last = marched.rows, slice(marched.first - 1, marched.stop)
-    joints, w = rows.joints[last], rows.w[last] / problem.box.widths
-    steps = np.sqrt(np.sum(np.diff(joints, axis=0) ** 2, axis=(1, 2)) / joints.shape[1])
-    near = 1.5 * np.hypot(steps, np.linalg.norm(np.diff(w, axis=0), axis=1))
-    gaps = np.max(np.abs(w[1:] - start.w / problem.box.widths), axis=1)
-    for k in np.flatnonzero(gaps <= near).tolist():
+    near = 1.5 * np.diff(rows.arc[last])
+    gaps = np.max(np.abs(rows.w[last][1:] - start.w) / problem.box.widths, axis=1)
+    left = rows.arc[last][1:] - start.arc > 2.0 * near  # the first steps, each longer, are near, too
+    for k in np.flatnonzero(left & (gaps <= near)).tolist():
         row = marched.first + k
         if _passes(problem, start, rows.point(row - 1), rows.point(row), float(near[k])):
             return row
