@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,8 @@ from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
-from contfric.chaos.tiles import Place, Tile, TileRows, compute_tile, empty_tile, inside, places
-from contfric.chaos.work import Work
+from contfric.chaos.tiles import Tile, TileRows, compute_tile, empty_tile, inside, places
+from contfric.chaos.work import Work, put_rows
 from contfric.errors import ParameterError, function_of, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import FloatArray, Model
@@ -144,15 +143,9 @@ def _computed(
     )
     with suppress(KeyboardInterrupt):
         work.finish(
-            [whole.part(place) for place in cut], lambda k, found: _put(rows, cut[k], found)
+            [whole.part(place) for place in cut], lambda k, found: put_rows(rows, cut[k], found)
         )
     return rows
-
-
-def _put(rows: TileRows, place: Place, found: TileRows) -> None:
-    # motions last: an interrupt in between must not leave a tile that counts as computed
-    for name in sorted((field.name for field in fields(TileRows)), key="motions".__eq__):
-        getattr(rows, name)[place] = getattr(found, name)
 
 
 def _compile(model: Model) -> None:
@@ -203,10 +196,7 @@ def _checked_params(
     """Return the fixed parameters as a vector, and all parameters of a point where the model is defined."""
     (first, rows), (second, columns) = grid.items()
     named = {**model.defaults, **params, first: rows[:, None], second: columns[None, :]}
-    try:
-        defined = np.argwhere(inside(model, named, (len(rows), len(columns))))
-    except (TypeError, OverflowError):  # a value that is no number: what follows says so
-        defined = np.empty((0, 2), dtype=np.int64)
+    defined = np.argwhere(inside(model, named, (len(rows), len(columns))))
     i, j = defined[0] if len(defined) else (0, 0)
     example = model.check_params({**params, first: rows[i], second: columns[j]})
     vector = model.vector(example)

@@ -105,7 +105,10 @@ def inside(model: Model, named: Mapping[str, Any], shape: tuple[int, ...]) -> ND
     """Tell where a model is defined; its parameters are numbers or arrays that make up ``shape``."""
     holds = np.ones(shape, dtype=np.bool_)
     for constraint in model.constraints:
-        left = constraint.value(named)
+        try:
+            left = constraint.value(named)
+        except (TypeError, OverflowError):  # a value that is no number: what takes it says so
+            continue
         holds &= (left > 0.0) if constraint.strict else (left >= 0.0)
     return holds
 

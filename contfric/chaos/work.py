@@ -55,6 +55,13 @@ def unpacked(model: str | bytes) -> Model:
     return found
 
 
+def put_rows(rows: Any, place: Any, found: Any) -> None:
+    """Write the rows of a tile, arrays in a data class, to their place in those of all tiles."""
+    # motions last: an interrupt in between must not leave a tile that counts as computed
+    for name in sorted((field.name for field in fields(rows)), key="motions".__eq__):
+        getattr(rows, name)[place] = getattr(found, name)
+
+
 @dataclass(frozen=True, eq=False)
 class Work(Generic[T, R]):
     """How tasks of one kind are finished.

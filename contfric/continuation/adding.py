@@ -232,10 +232,10 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
     """
     vector = orbit.vector.copy()
     vector[orbit.model.index_of(parameter)] = value
-    return refine(_settled(replace(orbit, vector=vector)))
+    return refine(_with_own_joints(replace(orbit, vector=vector)))
 
 
-def _settled(orbit: Orbit) -> Orbit:
+def _with_own_joints(orbit: Orbit) -> Orbit:
     """Return an orbit with the joints of the solution that takes its outcomes, after some rounds."""
     joints, end, system = orbit.joints.copy(), np.empty(orbit.joints.shape[1]), orbit.system
     found = follow_itinerary(system.functions(), system.layout, joints, orbit.vector, _ROUNDS, end)

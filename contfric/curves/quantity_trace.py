@@ -16,7 +16,7 @@ from contfric.continuation.kinds import kind_of_margin
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.locating import CurveStep
-from contfric.curves.points import end_of_march, march_on
+from contfric.curves.points import end_of_march, march_on, returned
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_step import Held
 from contfric.curves.ranges import PlaneRanges, Ranges, box_of
@@ -223,12 +223,13 @@ class HeldSide:
     def _advance(self, step: float, most: int) -> float | None:
         """March once and keep the points up to an end; return the next step, None if there is one."""
         found = march_on(self.held, self.points, self.held.border, step, self.largest, most)
-        for point in found.rows.points(found.first, found.stop):
+        closed = returned(self.held, self.points[0], found)
+        for row, point in enumerate(found.rows.points(found.first, found.stop), found.first):
             if min(self.held.inside(point)) < 0.0:
                 self._finish(self.points[-1], point)
                 return None
             self.points.append(point)
-            if len(self.points) > 4 and self._returned():
+            if row == closed:
                 self.end = CurveEnd(CurveEndReason.CLOSED)
                 return None
         reason = end_of_march(found.why)
@@ -242,40 +243,6 @@ class HeldSide:
         if self.progress is not None:
             where = self.held.box.text(self.points[-1].w)
             self.progress(f"{self.held.title}: {len(self.points)} points, {where}")
-
-    def _returned(self) -> bool:
-        """Tell whether the last step has passed the start again, in its direction.
-
-        Around a resonance the phase of the motion turns once, and the same orbit is met a period later.
-        """
-        first, before, last = self.points[0], self.points[-2], self.points[-1]
-        near = 1.5 * self.held.apart(before, last)
-        if np.max(np.abs(last.w - first.w) / self.held.box.widths) > near:
-            return False
-        turns = 0
-        if not self.held.orbit.model.autonomous:
-            turns = round(float(last.joints[0, 0] - first.joints[0, 0]) / self._period(last))
-        before, last = (self._earlier(point, turns) for point in (before, last))
-        if self.held.apart(last, first) > near:
-            return False
-        passed = [self._along(point, first) for point in (before, first, last)]
-        return passed[0] < passed[1] <= passed[2]
-
-    def _period(self, point: Point) -> float:
-        return float(self.held.orbit_of(point).flow.period)
-
-    def _earlier(self, point: Point, turns: int) -> Point:
-        """Return a point so many of its own periods earlier: a period changes along the curve."""
-        if not turns:
-            return point
-        joints = point.joints.copy()
-        joints[:, 0] -= turns * self._period(point)
-        return replace(point, joints=joints)
-
-    def _along(self, point: Point, first: Point) -> float:
-        """Return the scaled product of a point with the tangent of the first one."""
-        joints = float(np.sum(point.joints * first.tangent)) / len(point.joints)
-        return joints + float(np.sum(point.w * first.direction / self.held.box.widths**2))
 
     def _finish(self, before: Point, after: Point) -> None:
         """Locate where the orbits leave what is allowed, and end there."""

@@ -14,7 +14,7 @@ from contfric.curves.assembly import join_sides
 from contfric.curves.births import birth_among
 from contfric.curves.curve import Curve
 from contfric.curves.going_on import Start, goes_on, is_continuum, prove
-from contfric.curves.points import end_of_march, first_curve_point, march_on
+from contfric.curves.points import end_of_march, first_curve_point, march_on, returned
 from contfric.curves.problem import Problem, check_start, problem_of
 from contfric.curves.ranges import box_of
 from contfric.curves.side import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
@@ -259,7 +259,8 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
         side.end = CurveEnd(CurveEndReason.POINTS)
         return True, step
     problem, border = side.problem, side.border.copy()
-    rows, first, stop, why, step = march_on(problem, side.points, border, step, largest, most)
+    marched = march_on(problem, side.points, border, step, largest, most)
+    rows, first, stop, why, step = marched
     fresh = rows.points(first, stop)
     lasting = stop - 1 if why == EVENT else stop  # the last point lies after an event
     gone = _first(~np.all(np.diff(rows.joints[first:lasting, :, 0]) > -_NO_TIME, axis=1))
@@ -274,6 +275,11 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     if limit is not None:
         side.points += fresh[:limit]
         return end_at_limit(side, fresh[limit]), step
+    closed = returned(problem, side.points[0], marched)
+    if closed is not None and closed < lasting:
+        side.points += fresh[: closed + 1 - first]
+        side.end = CurveEnd(CurveEndReason.CLOSED)
+        return True, step
     if why in (EVENT, OUTSIDE):
         side.points += fresh[:-1]
         return resolve(side, fresh[-1], border), step

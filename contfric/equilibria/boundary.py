@@ -24,8 +24,8 @@ from enum import Enum
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.regions import ModeRegion, regions_of
+from contfric.equilibria.zero_curve import Arc, CurvePoint
 from contfric.models.definition import FloatArray
 
 #: A field vanishes: relative to what its rates are at a natural distance.
@@ -59,9 +59,9 @@ class Partner:
     product: float = float("nan")
 
 
-def partner_of(arc: Arc, place: CurvePoint) -> Partner:
+def partner_of(arc: Arc, point: CurvePoint) -> Partner:
     """Return what meets an equilibrium on a surface; its branch arrives there along its tangent."""
-    y, p = arc.at(place)
+    y, p = arc.at(point)
     others = [
         r for r in regions_of(arc.region.model) if r is not arc.region and _rests(r, arc, y, p)
     ]
@@ -72,10 +72,10 @@ def partner_of(arc: Arc, place: CurvePoint) -> Partner:
     region = others[0]
     product = product_of(arc.region, region, y, p)
     beside = replace(arc, region=region)
-    inwards = _inwards(beside, y, arc.parameter(place.x))
+    inwards = _inwards(beside, y, arc.parameter(point.x))
     if inwards is None:
         return Partner(Unfolding.DEGENERATE, product=product)
-    onwards = inwards.tangent[-1] * place.tangent[-1] > 0.0
+    onwards = inwards.tangent[-1] * point.tangent[-1] > 0.0
     unfolding = Unfolding.PERSISTENCE if onwards else Unfolding.FOLD
     return Partner(unfolding, (beside, inwards), region.mode, product)
 
@@ -91,24 +91,24 @@ def _rests(region: ModeRegion, arc: Arc, y: FloatArray, p: FloatArray) -> bool:
 
 def _inwards(arc: Arc, y: FloatArray, value: float) -> CurvePoint | None:
     """Return the point of a curve at the boundary of its region, directed inwards; None if it stays on it."""
-    place = arc.start(y, value, 1.0)
-    if place is None:
+    point = arc.start(y, value, 1.0)
+    if point is None:
         return None
-    touched = arc.region.touched(*arc.at(place))
+    touched = arc.region.touched(*arc.at(point))
     if len(touched) != 1:
         return None
-    domain, _ = arc.region.domain_of(y, arc.parameters(place.x))
-    rate = arc.region.sides(domain)[touched[0]] * height_rate(arc, place, touched[0])
+    domain, _ = arc.region.domain_of(y, arc.parameters(point.x))
+    rate = arc.region.sides(domain)[touched[0]] * height_rate(arc, point, touched[0])
     if rate == 0.0:
         return None
-    return place if rate > 0.0 else CurvePoint(place.x, -place.tangent)
+    return point if rate > 0.0 else CurvePoint(point.x, -point.tangent)
 
 
-def height_rate(arc: Arc, place: CurvePoint, surface: str) -> float:
+def height_rate(arc: Arc, point: CurvePoint, surface: str) -> float:
     """Return the rate of a height along a curve, by a central difference over a short chord of it."""
     k = arc.region.heights.names.index(surface)
     short = 1e-6  # the root of rounding is 1e-8; the height is smooth on the scale of the range
-    ahead, behind = place.x + short * place.tangent, place.x - short * place.tangent
+    ahead, behind = point.x + short * point.tangent, point.x - short * point.tangent
     heights = [
         arc.region.heights.value(arc.state(x), arc.parameters(x))[k] for x in (ahead, behind)
     ]

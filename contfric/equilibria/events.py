@@ -152,7 +152,7 @@ class HopfPoint(EquilibriumEvent):
         ConvergenceError
             If it is degenerate, if no section of the model cuts the cycle, or if no amplitude leads to one.
         """
-        from contfric.equilibria.born import cycle_of_hopf
+        from contfric.equilibria.cycles import cycle_of_hopf
 
         return cycle_of_hopf(self, amplitude)
 
@@ -202,6 +202,6 @@ class BoundaryPoint(EquilibriumEvent):
         ConvergenceError
             If no attracting cycle shrinks to the equilibrium as the parameter comes to the event.
         """
-        from contfric.equilibria.born import cycle_of_boundary
+        from contfric.equilibria.cycles import cycle_of_boundary
 
         return cycle_of_boundary(self, distance)

@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.branch import BranchEnd
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.hopf import is_oscillating
+from contfric.equilibria.zero_curve import Arc, CurvePoint
 
 #: Steps in the scaled product: the first, the shortest, and how a step that turned little grows.
 _FIRST, _SHORTEST, _GROWTH = 1e-3, 1e-10, 1.6
@@ -32,12 +32,12 @@ class LocatedSignChange:
     Attributes
     ----------
     test : "SN", "BP", "H", or the name of a surface
-    place : where it vanishes
+    point : where it vanishes
     before, after : the points around it
     """
 
     test: str
-    place: CurvePoint
+    point: CurvePoint
     before: CurvePoint
     after: CurvePoint
 
@@ -64,7 +64,7 @@ class Run:
     """
 
     arc: Arc
-    places: list[CurvePoint] = field(default_factory=list)
+    points: list[CurvePoint] = field(default_factory=list)
     crossings: list[LocatedSignChange] = field(default_factory=list)
     end: BranchEnd = BranchEnd.POINTS
     events: list[EquilibriumEvent] = field(default_factory=list)
@@ -74,8 +74,8 @@ def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
     """Follow a curve from a point along its tangent; it ends after the first boundary of its region."""
     run, step = Run(arc, [start]), _FIRST
     closes = _Closing(start)
-    while len(run.places) < limits.max_points:
-        last = run.places[-1]
+    while len(run.points) < limits.max_points:
+        last = run.points[-1]
         following, step = _next(arc, last, min(step, limits.max_step))
         if following is None:
             run.end = BranchEnd.LOST
@@ -92,10 +92,10 @@ def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
                 continue
             run.crossings.append(crossing)
             if _leaves(arc, crossing):
-                run.places.append(crossing.place)
+                run.points.append(crossing.point)
                 run.end = BranchEnd.BOUNDARY
                 return run
-        run.places.append(following)
+        run.points.append(following)
         if over is not None:
             return run
         if closes.by(following):
@@ -116,9 +116,9 @@ class _Closing:
     def __init__(self, start: CurvePoint) -> None:
         self.start, self.left, self.before = start, False, 0.0
 
-    def by(self, place: CurvePoint) -> bool:
-        ahead = float((place.x - self.start.x) @ self.start.tangent)
-        near = float(np.linalg.norm(place.x - self.start.x)) < 0.1
+    def by(self, point: CurvePoint) -> bool:
+        ahead = float((point.x - self.start.x) @ self.start.tangent)
+        near = float(np.linalg.norm(point.x - self.start.x)) < 0.1
         passed = self.left and near and self.before < 0.0 <= ahead
         self.left = self.left or ahead < 0.0
         self.before = ahead
@@ -142,9 +142,9 @@ def _at_bound(arc: Arc, last: CurvePoint, following: CurvePoint, bound: float) -
     return arc.located(last, following, lambda at: arc.parameter(at.x) - bound) or last
 
 
-def _over(arc: Arc, place: CurvePoint, limits: MarchLimits) -> float | None:
+def _over(arc: Arc, point: CurvePoint, limits: MarchLimits) -> float | None:
     """Return the bound of the parameter that a point lies beyond; None if it lies within."""
-    value = arc.parameter(place.x)
+    value = arc.parameter(point.x)
     return limits.high if value > limits.high else limits.low if value < limits.low else None
 
 
@@ -155,23 +155,23 @@ def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSi
         a, b = test(before), test(after)
         if a == 0.0 or not (a * b < 0.0 or b == 0.0):
             continue
-        place = arc.located(before, after, test)
-        if place is None:
+        point = arc.located(before, after, test)
+        if point is None:
             continue
-        found.append(LocatedSignChange(name, place, before, after))
+        found.append(LocatedSignChange(name, point, before, after))
     vertex = [c for c in found if c.test == "BP"]
     found = [  # the vertex of a pitchfork is no fold of its own
         c
         for c in found
         if c.test != "SN"
-        or not any(np.max(np.abs(c.place.x - b.place.x)) < _VERTEX for b in vertex)
+        or not any(np.max(np.abs(c.point.x - b.point.x)) < _VERTEX for b in vertex)
     ]
     along = after.x - before.x
-    return sorted(found, key=lambda c: float((c.place.x - before.x) @ along))
+    return sorted(found, key=lambda c: float((c.point.x - before.x) @ along))
 
 
-def _eigenvalues(arc: Arc, place: CurvePoint) -> np.ndarray:
-    return np.asarray(arc.region.eigenvalues(*arc.at(place)))
+def _eigenvalues(arc: Arc, point: CurvePoint) -> np.ndarray:
+    return np.asarray(arc.region.eigenvalues(*arc.at(point)))
 
 
 def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignChange]:
@@ -183,10 +183,10 @@ def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignC
     counts = [int(np.count_nonzero(_eigenvalues(arc, at).real > 0.0)) for at in (before, after)]
     found, k = [], min(counts)
     while k < max(counts):
-        place = arc.located(before, after, partial(_real_part, arc, k))
-        oscillating = place is not None and is_oscillating(_eigenvalues(arc, place), k)
-        if place is not None and oscillating:
-            found.append(LocatedSignChange("H", place, before, after))
+        point = arc.located(before, after, partial(_real_part, arc, k))
+        oscillating = point is not None and is_oscillating(_eigenvalues(arc, point), k)
+        if point is not None and oscillating:
+            found.append(LocatedSignChange("H", point, before, after))
         k += 2 if oscillating else 1
     return found
 

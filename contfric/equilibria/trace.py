@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.equilibria.arc import Arc, CurvePoint
 from contfric.equilibria.boundary import Partner, partner_of
 from contfric.equilibria.branch import BranchEnd, EquilibriumBranch
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, EquilibriumKind, HopfPoint
@@ -15,6 +14,7 @@ from contfric.equilibria.hopf import centre_of
 from contfric.equilibria.march import LocatedSignChange, MarchLimits, Run, march
 from contfric.equilibria.regions import check_no_excitation, scale_of
 from contfric.equilibria.result import Equilibrium, Location
+from contfric.equilibria.zero_curve import Arc, CurvePoint
 from contfric.errors import ParameterError, checked_range, real_number, shown, whole_number
 
 #: Largest step in the scaled product by default: a fiftieth of the range or of a natural size. What happens
@@ -124,10 +124,10 @@ def _followed(arc: Arc, start: CurvePoint, limits: MarchLimits) -> list[Run]:
     left = limits.max_points
     for _ in range(_MOST_RUNS):
         run = march(arc, start, replace(limits, max_points=left))
-        left -= len(run.places)
+        left -= len(run.points)
         partner: Partner | None = None
         for crossing in run.crossings:
-            if _is_at_limit(arc, crossing.place, limits):
+            if _is_at_limit(arc, crossing.point, limits):
                 run.end = BranchEnd.LIMIT if run.end is BranchEnd.BOUNDARY else run.end
                 continue
             found, partner = _event(arc, crossing)
@@ -143,23 +143,23 @@ def _followed(arc: Arc, start: CurvePoint, limits: MarchLimits) -> list[Run]:
     return runs
 
 
-def _is_at_limit(arc: Arc, place: CurvePoint, limits: MarchLimits) -> bool:
+def _is_at_limit(arc: Arc, point: CurvePoint, limits: MarchLimits) -> bool:
     """Tell whether an event is at a limit of the model, where formulas may degenerate."""
-    value, near = arc.parameter(place.x), _AT_LIMIT * (limits.high - limits.low)
+    value, near = arc.parameter(point.x), _AT_LIMIT * (limits.high - limits.low)
     below = limits.low_end is BranchEnd.LIMIT and value - limits.low < near
     return below or (limits.high_end is BranchEnd.LIMIT and limits.high - value < near)
 
 
-def _is_start(first: Run, arc: Arc, place: CurvePoint) -> bool:
+def _is_start(first: Run, arc: Arc, point: CurvePoint) -> bool:
     """Tell whether a branch comes back to the boundary that its first run left by."""
     again = first.arc.region is arc.region
-    return again and bool(np.max(np.abs(first.places[-1].x - place.x)) < 1e-9)
+    return again and bool(np.max(np.abs(first.points[-1].x - point.x)) < 1e-9)
 
 
 def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | None, Partner | None]:
     """Return an event as a result, and what meets the branch there; None where nothing happens."""
-    place = crossing.place
-    y, p = arc.at(place)
+    point = crossing.point
+    y, p = arc.at(point)
     at = equilibrium_at(arc.region, y, p)
     parameter = arc.region.model.parameter_names[arc.active]
     before, after = (_stable(arc, side) for side in (crossing.before, crossing.after))
@@ -172,7 +172,7 @@ def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | No
         return HopfPoint(EquilibriumKind.H, *common, centre_of(arc.region, y, p, arc.active)), None
     if arc.region.domain_of(y, p)[1]:
         return None, None  # still virtual on both sides
-    partner = partner_of(arc, place)
+    partner = partner_of(arc, point)
     if partner.start is not None:
         after = _stable(*partner.start)
     event = BoundaryPoint(
@@ -187,8 +187,8 @@ def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | No
     return event, partner
 
 
-def _stable(arc: Arc, place: CurvePoint) -> bool | None:
-    return equilibrium_at(arc.region, *arc.at(place)).stable
+def _stable(arc: Arc, point: CurvePoint) -> bool | None:
+    return equilibrium_at(arc.region, *arc.at(point)).stable
 
 
 def _branch(
@@ -196,12 +196,12 @@ def _branch(
 ) -> EquilibriumBranch:
     """Return both halves as one branch, from the end of the first to the end of the second."""
     n = len(start.state)
-    points = [(run.arc, place) for run in down for place in run.places][::-1]
+    points = [(run.arc, point) for run in down for point in run.points][::-1]
     events = [_reversed(event) for run in down for event in run.events][::-1]
-    later = [(run.arc, place) for run in up for place in run.places]
+    later = [(run.arc, point) for run in up for point in run.points]
     points += later[1:] if points else later
     events += [event for run in up for event in run.events]
-    found = [equilibrium_at(arc.region, *arc.at(place)) for arc, place in points]
+    found = [equilibrium_at(arc.region, *arc.at(point)) for arc, point in points]
     own = np.full((len(points), n), np.nan, dtype=np.complex128)
     for k, equilibrium in enumerate(found):
         own[k, : len(equilibrium.eigenvalues)] = equilibrium.eigenvalues
@@ -212,7 +212,7 @@ def _branch(
         start.model,
         parameter,
         start.vector,
-        np.array([arc.parameter(place.x) for arc, place in points]),
+        np.array([arc.parameter(point.x) for arc, point in points]),
         np.array([equilibrium.state for equilibrium in found]).reshape(-1, n),
         own,
         tuple(arc.region for arc, _ in points),

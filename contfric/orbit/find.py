@@ -132,7 +132,8 @@ def simulated_orbit(
         check_rest(trajectory)
         divided = _divided_by_phase(trajectory)
         if divided is not None:
-            return simulated_orbit(divided, params, *search.start, longest, progress=progress)
+            state, time = search.state, search.time
+            return simulated_orbit(divided, params, state, time, longest, progress=progress)
         _check_motion(trajectory)
         orbit = search.orbit_of(trajectory)
         if orbit is not None:
@@ -163,11 +164,6 @@ class _Search:
     def __post_init__(self) -> None:
         self.most = MOST if self.longest is None else self.longest
         self.unit = time_scale(self.model)
-
-    @property
-    def start(self) -> tuple[ArrayLike | None, float]:
-        """State and time from which the solution is followed."""
-        return self.state, self.time
 
     def begin(self) -> Trajectory:
         """Return the first stretch, in a unit of time in which something happens."""

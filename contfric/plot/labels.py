@@ -65,25 +65,20 @@ def place_labels(ax: Axes, anchors: Iterable[Anchor]) -> list[Annotation]:
         most = _HIDES
         todo = _merged(ax, todo, _ONE_OF_MANY * pixels)
         distances = _DISTANCES[:_NEAREST]
-    cell = _CELL * pixels
-    lines, markers = (_Counts(ax.bbox, cell, found(ax)) for found in (line_pixels, marker_pixels))
-    insets = [child.get_tightbbox() for child in ax.child_axes if isinstance(child, Axes)]
-    taken: list[Bbox] = [box for box in insets if box is not None]  # with their numbers
+    drawn = _Drawn(ax, pixels)
     placed: list[Annotation] = []
     for anchor in todo:
         at = np.asarray(ax.transData.transform((anchor.x, anchor.y)))
         label = _annotation(ax, anchor, (0.0, 0.0), leader=False)
         size = np.asarray(label.get_window_extent().size) + 2.0 * pixels
         label.remove()
-        centre, distance, cost = _best_place(ax, at, size, pixels, lines, markers, taken, distances)
+        centre, distance, cost = drawn.cheapest(at, size, distances)
         if cost >= most:
             continue  # wherever it stood it would hide another one, or too much
-        taken.append(_box(centre, size))
-        if distance > _DISTANCES[0]:  # later labels do not stand on its leader line
-            markers.add(np.linspace(at, centre, 12))
-        offset = (centre - at) / pixels
         leader = distance > _DISTANCES[0]
-        placed.append(_annotation(ax, anchor, (float(offset[0]), float(offset[1])), leader=leader))
+        drawn.add_label(at, centre, size, leader)
+        x, y = (centre - at) / pixels
+        placed.append(_annotation(ax, anchor, (float(x), float(y)), leader=leader))
     return placed
 
 
@@ -154,33 +149,40 @@ def _annotation(
     )
 
 
-def _best_place(
-    ax: Axes,
-    at: FloatArray,
-    size: FloatArray,
-    pixels: float,
-    lines: _Counts,
-    markers: _Counts,
-    taken: Sequence[Bbox],
-    distances: Sequence[float],
-) -> tuple[FloatArray, float, float]:
-    """Return the centre of the cheapest place, in pixels, its distance in points, and its cost."""
-    angles = 2.0 * np.pi * (np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
-    towards = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(distances), 1))
-    away = np.repeat(distances, _DIRECTIONS)
-    centres = at + towards * (away * pixels)[:, None] + 0.5 * size * np.clip(1.5 * towards, -1, 1)
-    low, high = centres - 0.5 * size, centres + 0.5 * size
-    cost = 0.8 * away + 1.5 * (1.0 - towards[:, 1])
-    cost += _LINE * lines.inside(low, high) + _MARKER * markers.inside(low, high)
-    for other in taken:
-        cost += _LABEL * ((low <= other.max) & (other.min <= high)).all(axis=1)
-    cost += _BEYOND * ((low < ax.bbox.min) | (high > ax.bbox.max)).any(axis=1)
-    best = int(np.argmin(cost))
-    return centres[best], float(away[best]), float(cost[best])
+class _Drawn:
+    """What is drawn on axes, in pixels: lines, markers, and the boxes of insets and labels."""
 
+    def __init__(self, ax: Axes, pixels: float) -> None:
+        self.bbox, self.pixels = ax.bbox, pixels
+        self.lines, self.markers = (
+            _Counts(ax.bbox, _CELL * pixels, found(ax)) for found in (line_pixels, marker_pixels)
+        )
+        insets = [child.get_tightbbox() for child in ax.child_axes if isinstance(child, Axes)]
+        self.boxes: list[Bbox] = [box for box in insets if box is not None]  # with their numbers
 
-def _box(centre: FloatArray, size: FloatArray) -> Bbox:
-    return Bbox([centre - 0.5 * size, centre + 0.5 * size])
+    def cheapest(
+        self, at: FloatArray, size: FloatArray, distances: Sequence[float]
+    ) -> tuple[FloatArray, float, float]:
+        """Return where a label hides least: its centre in pixels, its distance in points, and its cost."""
+        angles = 2.0 * np.pi * (np.arange(_DIRECTIONS) + 1.0) / _DIRECTIONS
+        towards = np.tile(np.column_stack([np.cos(angles), np.sin(angles)]), (len(distances), 1))
+        away = np.repeat(distances, _DIRECTIONS)
+        aside = 0.5 * size * np.clip(1.5 * towards, -1, 1)
+        centres = at + towards * (away * self.pixels)[:, None] + aside
+        low, high = centres - 0.5 * size, centres + 0.5 * size
+        cost = 0.8 * away + 1.5 * (1.0 - towards[:, 1])
+        cost += _LINE * self.lines.inside(low, high) + _MARKER * self.markers.inside(low, high)
+        for other in self.boxes:
+            cost += _LABEL * ((low <= other.max) & (other.min <= high)).all(axis=1)
+        cost += _BEYOND * ((low < self.bbox.min) | (high > self.bbox.max)).any(axis=1)
+        best = int(np.argmin(cost))
+        return centres[best], float(away[best]), float(cost[best])
+
+    def add_label(self, at: FloatArray, centre: FloatArray, size: FloatArray, leader: bool) -> None:
+        """Add a label: later ones stand neither on it nor on the line that leads to it."""
+        self.boxes.append(Bbox([centre - 0.5 * size, centre + 0.5 * size]))
+        if leader:
+            self.markers.add(np.linspace(at, centre, 12))
 
 
 class _Counts:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor, duration
 from contfric.chaos.status import Motion
-from contfric.chaos.work import Work
+from contfric.chaos.work import Work, put_rows
 from contfric.errors import (
     ParameterError,
     did_you_mean,
@@ -295,13 +295,7 @@ def _label(job: _BasinJob, attractors: Attractors, chosen: IntArray, rows: Basin
         "basins", compute_basin_tile, job.executor, job.progress
     )
     tiles = [job.tile(attractors, part) for part in parts]
-    work.finish(tiles, lambda k, found: _put(rows, parts[k], found))
-
-
-def _put(rows: BasinRows, part: IntArray, found: BasinRows) -> None:
-    # motions last: an interrupt in between must not leave a tile that counts as computed
-    rows.labels[part] = found.labels
-    rows.motions[part] = found.motions
+    work.finish(tiles, lambda k, found: put_rows(rows, parts[k], found))
 
 
 def _resolve(job: _BasinJob, attractors: Attractors, rows: BasinRows) -> None:

@@ -6,7 +6,7 @@ A tile of a release map: some releases, which any process follows to the next on
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor
-from contfric.chaos.work import TileTask, Work
+from contfric.chaos.work import TileTask, Work, put_rows
 from contfric.errors import function_of, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import FloatArray, Model
@@ -109,7 +109,9 @@ def release_map(
     parts = [slice(first, first + tile) for first in range(0, len(times), tile)]
     rows = ReleaseRows.empty(len(times), len(model.states))
     with kept_in(folder):
-        work.finish([whole.part(part) for part in parts], lambda k, got: rows.put(parts[k], got))
+        work.finish(
+            [whole.part(part) for part in parts], lambda k, got: put_rows(rows, parts[k], got)
+        )
     found, period = rows.found, view.period
     returns, images = np.full(len(times), np.nan), np.full(len(times), np.nan)
     returns[found] = (rows.times + rows.cycles * period - times)[found]
@@ -165,11 +167,6 @@ class ReleaseRows:
         return ReleaseRows(
             found, numbers, np.full(count, np.nan), np.full((count, n), np.nan), numbers.copy()
         )
-
-    def put(self, part: slice, rows: ReleaseRows) -> None:
-        """Write the rows of a tile to their place."""
-        for field in fields(self):
-            getattr(self, field.name)[part] = getattr(rows, field.name)
 
 
 @dataclass(frozen=True, eq=False)

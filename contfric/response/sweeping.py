@@ -193,10 +193,7 @@ def _defined(
 ) -> IntArray:
     """Return the numbers of the values at which the model is defined; all where none is, for the message."""
     named = {**model.defaults, **fixed, parameter: grid}
-    try:
-        found = np.flatnonzero(inside(model, named, grid.shape))
-    except (TypeError, OverflowError):  # a value that is no number: what follows says so
-        found = np.arange(0)
+    found = np.flatnonzero(inside(model, named, grid.shape))
     return np.asarray(found if len(found) else np.arange(len(grid)), dtype=np.int64)
 
 

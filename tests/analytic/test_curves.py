@@ -147,3 +147,23 @@ def test_differences_give_the_same_points(events) -> None:
     for name in PLANE:
         assert found.params[name][0] == pytest.approx(exact.params[name][0], abs=1e-12)
         assert found.params[name][-1] == pytest.approx(exact.params[name][-1], abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_curve_around_a_resonance_is_closed(seed: int) -> None:
+    """Where the wall is just touched: (k - w^2)^2 + (c w)^2 = (A / d)^2, through negative damping.
+
+    Around the resonance the phase turns once: joints are a period later then, or earlier.
+    """
+    r = np.random.default_rng(seed)
+    k, d, damping = r.uniform(0.8, 1.2), r.uniform(1.5, 3.0), r.uniform(0.02, 0.2)
+    given = {"A": 1.0, "k": k, "c": damping, "d": d, "w": 0.3 * np.sqrt(k)}
+    branch = cf.continue_orbit(cf.find_orbit("impact", given), "w", (0.2, np.sqrt(k)))
+    touch = next(b for b in branch.bifurcations if b.kind is cf.Kind.GS)
+    curve = cf.continue_bifurcation(touch, ("w", "c"), {"w": (0.1, 2.0), "c": (-3.0, 3.0)})
+    assert [end.reason.name for end in curve.ends] == ["CLOSED", "CLOSED"]
+    w, c = curve.values.T
+    assert np.max(np.abs((k - w**2) ** 2 + (c * w) ** 2 - d**-2)) < 1e-9
+    assert np.min(c) < 0.0 < np.max(c)
+    angle = np.unwrap(np.arctan2(c, w - np.sqrt(k)))
+    assert 2.0 * np.pi <= abs(angle[-1] - angle[0]) < 3.0 * np.pi, "once around"

@@ -73,9 +73,9 @@ class Arc:
         found[self.active] = self.parameter(x)
         return found
 
-    def at(self, place: CurvePoint) -> tuple[FloatArray, FloatArray]:
+    def at(self, point: CurvePoint) -> tuple[FloatArray, FloatArray]:
         """Return state and parameters of a point of the curve."""
-        return self.state(place.x), self.parameters(place.x)
+        return self.state(point.x), self.parameters(point.x)
 
     def unknowns(self, y: FloatArray, value: float) -> FloatArray:
         """Return the scaled unknowns of a state and a parameter."""
@@ -132,10 +132,10 @@ class Arc:
         upwards[-1] = sign
         return self.corrected(self.unknowns(y, value), upwards)
 
-    def orientation(self, place: CurvePoint) -> float:
+    def orientation(self, point: CurvePoint) -> float:
         """Return the determinant of the bordered matrix as a geometric mean; 0 at a branch point."""
-        sign, size = np.linalg.slogdet(np.vstack([self.jacobian(place.x), place.tangent]))
-        return float(sign * np.exp(size / len(place.x))) if np.isfinite(size) else 0.0
+        sign, size = np.linalg.slogdet(np.vstack([self.jacobian(point.x), point.tangent]))
+        return float(sign * np.exp(size / len(point.x))) if np.isfinite(size) else 0.0
 
     def located(
         self, before: CurvePoint, after: CurvePoint, test: Callable[[CurvePoint], float]
@@ -152,10 +152,10 @@ class Arc:
         known: list[tuple[float, float, CurvePoint]] = []
 
         def value(share: float) -> float:
-            place = self.corrected(before.x + share * chord, normal)
-            if place is None:
+            point = self.corrected(before.x + share * chord, normal)
+            if point is None:
                 raise _LostError(share)
-            known.append((share, test(place), place))
+            known.append((share, test(point), point))
             return known[-1][1]
 
         try:
