@@ -67,6 +67,8 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
     if found.orbits and not found.model.autonomous:
         handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
+    if found.missing:
+        handles.append(Line2D([], [], ls="", label=f"{found.missing} starts not computed"))
     ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     name_axes(ax, f"${first}$", f"${second}$")
     return ax

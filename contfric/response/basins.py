@@ -94,7 +94,12 @@ class Basins(Tabled):
     @property
     def complete(self) -> bool:
         """Whether all starts have been computed; False after an interrupt."""
-        return not bool(np.any(self.motions == Motion.MISSING.code))
+        return not self.missing
+
+    @property
+    def missing(self) -> int:
+        """Number of starts that have not been computed, after an interrupt."""
+        return int(np.sum(self.motions == Motion.MISSING.code))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -104,7 +109,7 @@ class Basins(Tabled):
     @property
     def share(self) -> FloatArray:
         """Share of all computed starts that converge to each of the orbits, shape (orbits,)."""
-        total = int(np.sum(self.motions != Motion.MISSING.code))
+        total = self.motions.size - self.missing
         counts = np.bincount(self.labels[self.labels >= 0], minlength=len(self.orbits))
         return np.asarray(counts / max(1, total))
 
@@ -119,9 +124,10 @@ class Basins(Tabled):
         """Shares of all that occurs: orbits in their order, then what converges to none.
 
         The interval is that of as many starts drawn at random. A regular grid does better: only cells at the
-        boundary are uncertain.
+        boundary are uncertain. After an interrupt they are those of the part of the grid that was computed,
+        and say nothing of the rest.
         """
-        total = int(np.sum(self.motions != Motion.MISSING.code))
+        total = self.motions.size - self.missing
         found = [(name, k, int(np.sum(self.labels == k))) for k, name in enumerate(self.names)]
         found += [
             (motion.name.lower(), -1, int(np.sum(self.where(motion))))
@@ -170,7 +176,10 @@ class Basins(Tabled):
 
     def __repr__(self) -> str:
         shape = " x ".join(str(length) for length in self.shape)
-        found = ", ".join(f"{s.name} {s.share:.1%}" for s in self.shares)
+        parts = [f"{s.name} {s.share:.1%}" for s in self.shares]
+        if self.missing:
+            parts.append(f"{self.missing} not computed, which the shares do not count")
+        found = ", ".join(parts)
         return f"<Basins of {self.model.name}: {shape} starts in {', '.join(self.axes)}; {found}>"
 
 

@@ -228,7 +228,11 @@ def test_interrupted_and_gone_on(three: cf.Basins, tmp_path: Path) -> None:
     options: dict[str, Any] = {"tile": 100, "folder": tmp_path}
     part = cf.basins("coulomb", GRID, THREE, progress=stop, **options)
     assert not part.complete and np.any(part.labels >= 0)
-    assert sum(share.count for share in part.shares) < part.labels.size
+    assert sum(share.count for share in part.shares) == part.labels.size - part.missing
+    left = part.missing
+    assert left > 0 and f"{left} not computed" in repr(part) and "not computed" not in repr(three)
+    entries = [text.get_text() for text in part.plot().get_legend().get_texts()]
+    assert f"{left} starts not computed" in entries
     whole = cf.basins("coulomb", GRID, THREE, **options)
     assert whole.complete and bits(whole) == bits(three)
     small = GRID | {"x": GRID["x"][::8]}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import importlib
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,6 +14,8 @@ import pytest
 import contfric as cf
 from contfric.remember.questions import Question
 from contfric.remember.stored import UnstorableError
+from contfric.study import read_study
+from contfric.study.checkpoint import key_of
 
 WHOLE = """
 import math
@@ -93,9 +97,6 @@ def write(path: Path, factor: float) -> str:
 
 
 def reload(name: str, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    import importlib
-    import sys
-
     monkeypatch.delitem(sys.modules, name, raising=False)
     importlib.invalidate_caches()
     for file in (folder / "__pycache__").glob("*"):
@@ -139,3 +140,21 @@ def test_a_fit_goes_on_only_with_the_same_function(
 
     first = fitted(1.0)
     assert fitted(1.0) == first and abs(fitted(1.001) - first) > 1e-5
+
+
+def test_a_run_goes_on_only_with_the_same_function(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    study = tmp_path / "study.yaml"
+
+    def key_with(factor: float) -> str:
+        name = write(tmp_path, factor)
+        reload(name, monkeypatch, tmp_path)
+        study.write_text(
+            "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"
+            f"continue: {{parameter: Omega, range: [0.49, 0.51]}}\nwant: [{name}:width]\n"
+        )
+        return key_of(read_study(study))
+
+    assert key_with(1.0) == key_with(1.0) != key_with(2.0)
