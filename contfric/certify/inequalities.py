@@ -19,7 +19,14 @@ from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import EventCondition
 from contfric.certify.sign import Path, positive, touched, undecided
 from contfric.certify.verdict import Finding, Verdict
-from contfric.certify.zeros import Closing, at_start, in_span, order_at_start, zeros_at_joints
+from contfric.certify.zeros import (
+    Closing,
+    at_start,
+    in_span,
+    order_at_start,
+    vanishes_behind,
+    zeros_at_joints,
+)
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.system import System
@@ -146,8 +153,19 @@ def inequalities(
         at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
         if found.what == JOINT and in_span(model.rows[found.surface], at_event):
             continue
+        rests = bool(more) and _enters_at_rest(chain, known[found.segment], found)
+        if rests and found.surface in dict(_inside(system, found.segment, surfaces)):
+            continue  # which side it goes on to is what the inequality inside says
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
+
+
+def _enters_at_rest(chain: Chain, zeros: list[Vector], found: Inequality) -> bool:
+    """Tell whether a segment begins on a surface, as it does behind an impact without speed."""
+    if found.what != ENTRY:
+        return False
+    reset = chain.model.resets[chain.segments.resets[found.segment]]
+    return vanishes_behind(chain.model.rows[found.surface], reset, zeros)
 
 
 def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
@@ -194,7 +212,13 @@ def rows_met(
         return {i - 1: [model.rows[surface]]}
     if condition.departs or condition.rate:
         return {i: [model.rate(surface, condition.departs or segments.modes[i])]}
-    return {i: [model.rows[surface]]}
+    row, found = model.rows[surface], dict[int, list[Vector]]()
+    for k in range(i, segments.count if segments.images else i + segments.count):
+        at = k % segments.count  # and where what rests then keeps it
+        if k > i and (segments.resets[at] or not model.keeps(row, segments.modes[at])):
+            break
+        found[at] = [row]
+    return found
 
 
 def _is_of(met: EventCondition, found: Inequality) -> bool:

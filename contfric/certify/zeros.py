@@ -99,7 +99,19 @@ def _behind(rows: list[Vector], model: BallModel, reset: str, mode: str) -> list
     """
     matrix = model.resets[reset]
     found = [*model.rows.values(), model.rate(reset, mode)]
-    return [row for row in found if in_span(numbers(arb_mat([row]) * matrix), rows)]
+    return [row for row in found if vanishes_behind(row, matrix, rows)]
+
+
+def vanishes_behind(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
+    """Tell whether a row vanishes after a reset, if others do before it.
+
+    A row that a reset leaves as it is may have balls, as those of the level of a wall that is moved.
+    """
+    if in_span(numbers(arb_mat([row]) * reset), rows):
+        return True
+    size = reset.nrows()
+    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    return in_span(row, rows) and in_span(numbers(arb_mat([row]) * (reset - one)), rows)
 
 
 def _is_zero(row: Vector) -> bool:
