@@ -126,16 +126,19 @@ def inequalities(
         path = Path(move.field, move.start, duration.upper(), duration.lower())
         for surface, sign in _inside(system, i, surfaces):
             row, name = model.surfaces[surface] * sign, InequalityName(i, surface, JOINT)
-            ends = bool(
+            ends = int(
                 segments.exits[i] == surface
                 or segments.pins[(i + 1) % segments.count] == surface
                 or name in loose
                 or (i == still - 1 and in_span(model.rows[surface], known[still]))
                 or in_span(model.rows[surface], more.get(i, []))
             )
-            order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
-            if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
-                order = max(order, 1)  # it is not negative there, which is as good as zero
+            if name in loose and grazes_at_end(EventCondition(i, surface), segments, model):
+                ends = 2  # its rate vanishes at the end, too
+            # an observable that is not negative at the start is as good as one that is zero
+            least = InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]
+            at = segments.modes[i], zeros, surface, int(least)
+            order = order_at_start(model, model.rows[surface], *at)
             if order and all(x.is_zero() for x in numbers(row * path.field)):
                 continue
             if _is_event(touch, i, surface):

@@ -153,7 +153,12 @@ def _without(row: Vector, pivot: Vector, at: int) -> Vector:
 
 
 def order_at_start(
-    model: BallModel, row: Vector, mode: str, known: list[Vector], surface: str = ""
+    model: BallModel,
+    row: Vector,
+    mode: str,
+    known: list[Vector],
+    surface: str = "",
+    least: int = 0,
 ) -> int:
     """Return how many of an observable and its derivatives along a mode vanish at a start by construction.
 
@@ -161,11 +166,13 @@ def order_at_start(
     ----------
     row : the observable
     surface : that it is the distance to, if it is one: its derivatives are then known as such
+    least : how many are known to vanish
     """
     for order in range(MOST_ORDER):
         row = model.rate(surface, mode, order) if surface else row
         named = model.alike(surface, mode) if surface and order == 1 and model.alike else None
-        if not in_span(row, known) and not (named and in_span(model.rows[named], known)):
+        vanishes = in_span(row, known) or (named and in_span(model.rows[named], known))
+        if order >= least and not vanishes:
             return order
         row = numbers(arb_mat([row]) * model.fields[mode])
     return MOST_ORDER
