@@ -17,14 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from flint import arb, arb_mat
+from flint import arb
 
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import is_off
 from contfric.certify.extended import Builder, EventCondition, rows_of
 from contfric.certify.inequalities import (
     DURATION,
-    ENTRY,
     EXIT,
     INSIDE,
     JOINT,
@@ -52,7 +51,7 @@ _BEYOND = 0.1
 #: Where in the box of a PD or BP its tube begins, as a share of its reach.
 WITHIN = 0.8
 #: Inequalities at joints, which may change their sign in the box of an end.
-_NUMBERS = (DURATION, JOINT, EXIT, ENTRY)
+_NUMBERS = (DURATION, JOINT, EXIT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,20 +261,10 @@ def _falls(edge: Edge, box: Box, name: InequalityName, window: arb | None) -> bo
     else:
         if sign is None:
             return False
-        rate, after = name.what == EXIT, name.what != ENTRY
-        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), int(rate))
-        if not after:
-            rows = behind(chain, i, *rows)
-        slope = sign * dot(chain.observed(z, i + after, *rows)[1], box.tangent)
+        order = int(name.what == EXIT)
+        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
+        slope = sign * dot(chain.observed(z, i + 1, *rows)[1], box.tangent)
     return bool(slope < 0 if edge.forward else slope > 0)
-
-
-def behind(chain: Chain, i: int, row: arb_mat, slope: arb_mat) -> tuple[arb_mat, arb_mat]:
-    """Return an observable after the reset before a segment as one of the state before it; and its slope."""
-    model, name = chain.model, chain.segments.resets[i]
-    assert model.slopes is not None
-    reset = model.resets[name]
-    return row * reset, slope * reset + row * model.slopes.resets[name]
 
 
 def signs_of(system: System, name: InequalityName) -> int | None:
@@ -284,9 +273,8 @@ def signs_of(system: System, name: InequalityName) -> int | None:
     i = name.segment
     if name.what == EXIT:
         return int(layout.exit_signs[i])
-    if name.what in (JOINT, ENTRY):
-        entry = int(name.what == ENTRY)
-        rows = [(at, surfaces[k], s) for at, k, s, where in layout.joint if where == entry]
+    if name.what == JOINT:
+        rows = [(at, surfaces[k], s) for at, k, s, where in layout.joint if where == 0]
     else:
         rows = [(at, surfaces[k], s) for at, k, s in layout.interior]
         if layout.pins[i] == -1 and layout.exit_signs[i]:
