@@ -235,6 +235,28 @@ def _what_else(text: str) -> str:
     return ""
 
 
+def _unstated(text: str) -> str:
+    """Return which event the summary of a diagram calls checkable though no part of the file states it."""
+    data = json.loads(text)
+    if data["certificate"] != "diagram" or "summary" not in data:
+        return ""
+    with working(_EVENT_BITS):
+        parts = [p for p in data["checkable"] if p["certificate"] == "event"]
+        stated = [(p["kind"], arb(p["value"])) for p in parts]
+        try:
+            for event in data["summary"]["events"]:
+                if not event["checkable"] or event["why"]:
+                    continue
+                ball = arb(event["ball"])
+                same = [x for x in stated if x[0] == event["kind"] and x[1].contains(ball)]
+                if not same:
+                    return f"{event['label']} at {event['ball']}"
+                stated.remove(same[0])
+        except (KeyError, TypeError, ValueError) as error:
+            return f"an event that cannot be read ({error!r})"
+    return ""
+
+
 def verify(path: Any) -> Answer:
     """Check a certificate file by the independent checker.
 
@@ -255,6 +277,11 @@ def verify(path: Any) -> Answer:
     except UnicodeDecodeError:
         return Answer(False, f"{file.name} is no certificate: it is no text")
     answer = check_text(text)
+    unstated = _unstated(text) if answer.yes else ""
+    if unstated:
+        return Answer(
+            False, f"no part of the file states what its summary calls checkable: {unstated}"
+        )
     other = "" if answer.yes else _what_else(text)
     if other:
         return answer._replace(why=f"{file.name} is no certificate: {other}")

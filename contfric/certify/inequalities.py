@@ -19,7 +19,14 @@ from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import EventCondition
 from contfric.certify.sign import Path, positive, touched, undecided
 from contfric.certify.verdict import Finding, Verdict
-from contfric.certify.zeros import Closing, at_start, in_span, order_at_start, zeros_at_joints
+from contfric.certify.zeros import (
+    Closing,
+    at_start,
+    in_span,
+    order_at_start,
+    vanishes_behind,
+    zeros_at_joints,
+)
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.system import System
@@ -119,16 +126,19 @@ def inequalities(
         path = Path(move.field, move.start, duration.upper(), duration.lower())
         for surface, sign in _inside(system, i, surfaces):
             row, name = model.surfaces[surface] * sign, InequalityName(i, surface, JOINT)
-            ends = bool(
+            ends = int(
                 segments.exits[i] == surface
                 or segments.pins[(i + 1) % segments.count] == surface
                 or name in loose
                 or (i == still - 1 and in_span(model.rows[surface], known[still]))
                 or in_span(model.rows[surface], more.get(i, []))
             )
-            order = order_at_start(model, model.rows[surface], segments.modes[i], zeros, surface)
-            if InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]:
-                order = max(order, 1)  # it is not negative there, which is as good as zero
+            if name in loose and grazes_at_end(EventCondition(i, surface), segments, model):
+                ends = 2  # its rate vanishes at the end, too
+            # an observable that is not negative at the start is as good as one that is zero
+            least = InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]
+            at = segments.modes[i], zeros, surface, int(least)
+            order = order_at_start(model, model.rows[surface], *at)
             if order and all(x.is_zero() for x in numbers(row * path.field)):
                 continue
             if _is_event(touch, i, surface):
@@ -146,8 +156,19 @@ def inequalities(
         at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
         if found.what == JOINT and in_span(model.rows[found.surface], at_event):
             continue
+        rests = bool(more) and _enters_at_rest(chain, known[found.segment], found)
+        if rests and found.surface in dict(_inside(system, found.segment, surfaces)):
+            continue  # which side it goes on to is what the inequality inside says
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
+
+
+def _enters_at_rest(chain: Chain, zeros: list[Vector], found: Inequality) -> bool:
+    """Tell whether a segment begins on a surface, as it does behind an impact without speed."""
+    if found.what != ENTRY:
+        return False
+    reset = chain.model.resets[chain.segments.resets[found.segment]]
+    return vanishes_behind(chain.model.rows[found.surface], reset, zeros)
 
 
 def _is_event(touch: Touch | None, i: int, surface: str) -> bool:
@@ -194,7 +215,13 @@ def rows_met(
         return {i - 1: [model.rows[surface]]}
     if condition.departs or condition.rate:
         return {i: [model.rate(surface, condition.departs or segments.modes[i])]}
-    return {i: [model.rows[surface]]}
+    row, found = model.rows[surface], dict[int, list[Vector]]()
+    for k in range(i, segments.count if segments.images else i + segments.count):
+        at = k % segments.count  # and where what rests then keeps it
+        if k > i and (segments.resets[at] or not model.keeps(row, segments.modes[at])):
+            break
+        found[at] = [row]
+    return found
 
 
 def _is_of(met: EventCondition, found: Inequality) -> bool:

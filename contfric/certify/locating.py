@@ -204,9 +204,8 @@ def _multiplier_orbit(event: Bifurcation) -> Orbit:
 def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, list[EventFunction]]:
     """Return an orbit without vanished segments, on its half if it is symmetric; and the tests there."""
     whole, model = orbit.as_whole(), orbit.model
-    lasts = whole.durations
-    kept = [i for i, duration in enumerate(lasts) if duration > _VANISHED]
-    itinerary = tuple(whole.itinerary[i] for i in kept)
+    segments, tests = _lasting(whole, tests)
+    kept, itinerary = list(segments), tuple(segments.values())
     joints = whole.cycle[kept]
     times = _repeats(itinerary, joints, whole)
     if times > 1:
@@ -239,7 +238,48 @@ def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, li
         moved = EventFunction(test.margin, at, surface)
         if moved not in found:
             found.append(moved)
-    return replace(whole, system=system, joints=joints.copy()), found
+    least = replace(whole, system=system, joints=joints.copy())
+    return least, [test for test in found if not _is_kept(least, test, found)]
+
+
+def _lasting(
+    orbit: Orbit, tests: tuple[EventFunction, ...]
+) -> tuple[dict[int, tuple[str, str]], tuple[EventFunction, ...]]:
+    """Return mode and exit of the segments of an orbit that last, by number; and tests of these.
+
+    Two of one mode, between which only vanished ones are, are one that touches the exit of the first. What
+    vanishes behind an impact without speed does not move on: the segment before it ends where that one does.
+    """
+    count, resets, lasts = len(orbit.durations), orbit.system.layout.resets, orbit.durations
+    found = {i: orbit.itinerary[i] for i in range(count) if lasts[i] > _VANISHED}
+    for i in [i for i in found if (i + 1) % count not in found]:
+        if i not in found:  # a part of the one before it by now
+            continue
+        gone = (i + 1) % count
+        after = next(k % count for k in range(gone, gone + count) if k % count in found)
+        (mode, exit_), margin = found[i], Margin.EXIT
+        if resets[gone] >= 0:
+            exit_, margin = orbit.itinerary[gone][1], Margin.JOINT
+        elif after != i and found[after][0] == mode and resets[after] < 0:
+            exit_, margin = found.pop(after)[1], Margin.INTERIOR
+        found[i] = mode, exit_
+        tests = tuple(
+            replace(t, margin=margin) if (t.segment, t.margin) == (i, Margin.EXIT) else t
+            for t in tests
+        )
+    return found, tests
+
+
+def _is_kept(orbit: Orbit, test: EventFunction, tests: list[EventFunction]) -> bool:
+    """Tell whether a surface is met at the end of a segment because it is met at its start, as in rest."""
+    i, half = test.segment, orbit.system.half
+    before = replace(test, segment=(i or orbit.system.segments * (not half)) - 1)
+    if test.margin is not Margin.JOINT or before not in tests or before == test:
+        return False
+    if orbit.system.layout.resets[i] >= 0:
+        return False
+    balls = ball_model(orbit.model, orbit.params)
+    return balls.keeps(balls.rows[test.surface], orbit.system.itinerary[i][0])
 
 
 def _repeats(itinerary: Itinerary, joints: FloatArray, orbit: Orbit) -> int:

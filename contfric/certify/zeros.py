@@ -99,7 +99,19 @@ def _behind(rows: list[Vector], model: BallModel, reset: str, mode: str) -> list
     """
     matrix = model.resets[reset]
     found = [*model.rows.values(), model.rate(reset, mode)]
-    return [row for row in found if in_span(numbers(arb_mat([row]) * matrix), rows)]
+    return [row for row in found if vanishes_behind(row, matrix, rows)]
+
+
+def vanishes_behind(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
+    """Tell whether a row vanishes after a reset, if others do before it.
+
+    A row that a reset leaves as it is may have balls, as those of the level of a wall that is moved.
+    """
+    if in_span(numbers(arb_mat([row]) * reset), rows):
+        return True
+    size = reset.nrows()
+    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    return in_span(row, rows) and in_span(numbers(arb_mat([row]) * (reset - one)), rows)
 
 
 def _is_zero(row: Vector) -> bool:
@@ -141,7 +153,12 @@ def _without(row: Vector, pivot: Vector, at: int) -> Vector:
 
 
 def order_at_start(
-    model: BallModel, row: Vector, mode: str, known: list[Vector], surface: str = ""
+    model: BallModel,
+    row: Vector,
+    mode: str,
+    known: list[Vector],
+    surface: str = "",
+    least: int = 0,
 ) -> int:
     """Return how many of an observable and its derivatives along a mode vanish at a start by construction.
 
@@ -149,11 +166,13 @@ def order_at_start(
     ----------
     row : the observable
     surface : that it is the distance to, if it is one: its derivatives are then known as such
+    least : how many are known to vanish
     """
     for order in range(MOST_ORDER):
         row = model.rate(surface, mode, order) if surface else row
         named = model.alike(surface, mode) if surface and order == 1 and model.alike else None
-        if not in_span(row, known) and not (named and in_span(model.rows[named], known)):
+        vanishes = in_span(row, known) or (named and in_span(model.rows[named], known))
+        if order >= least and not vanishes:
             return order
         row = numbers(arb_mat([row]) * model.fields[mode])
     return MOST_ORDER

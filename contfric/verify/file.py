@@ -110,12 +110,12 @@ def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
 
 
 def _check_event(data: Any) -> tuple[list[str], list[Any]]:
-    kind, at, value, (a, b) = data["kind"], data["at"], ball(data["value"]), orbits_at(data)
-    name, end = data["parameter"], None if at is None else (kind, [at])
-    found, box = events_between(data, a, b, end)
+    kind, at, (a, b) = data["kind"], data["at"], orbits_at(data)
+    found, box = events_between(data, a, b, None if at is None else (kind, [at]))
     see(found == [kind], f"it has those events, not {found}")
-    see(value.rad() - abs((near := box.orbits(INSIDE))[0].value - value.mid()), "it is in the ball")
-    return ["exists", f"is a {kind} in {name}", "admissible"], [kind, {0: [near] * 2}, [box]]
+    near, what = box.orbits(INSIDE), f"is a {kind} in {data['parameter']}"
+    see(ball(data["value"]).contains(near[0].value), "it is in the ball", False)
+    return ["exists", what, "admissible"], [kind, {0: [near] * 2}, [box]]
 
 
 def _check_orbit(data: Any) -> tuple[list[str], list[Any]]:

@@ -24,9 +24,11 @@ class Undecided(Exception):
 
 
 def ball(value: Any) -> arb:
-    """Return a number of a file, or the ball of a text such as ``1.25 +/- 1e-30``."""
-    text = isinstance(value, str) and re.fullmatch(f"(-?{_NUMBER} )?[+]/- {_NUMBER}", value)
-    if text or (type(value) in (int, float) and arb(value).is_finite()):
+    """Return a number of a file, or a ball inside that of a text such as ``1.25 +/- 1e-30``."""
+    if text := re.fullmatch(f"(-?{_NUMBER} )?[+]/- ({_NUMBER})", str(value)):  # no number is one
+        middle, radius = arb(text[1] or 0), arb(text[4])  # an arb rounds its radius up
+        return arb(middle.mid(), ((radius - middle.rad()) * 0.999999).lower().max(arb(0)))
+    if type(value) in (int, float) and arb(value).is_finite():
         return arb(value)
     raise Refused(f"{str(value)[:40]!r} is no number, and no ball such as '1.25 +/- 1e-30'")
 
@@ -110,8 +112,7 @@ class Scene:
         jerk = first - v - 2 * self.zeta * a if slides else 0
         if name == "v":
             return v, a, jerk, second - a - 2 * self.zeta * jerk
-        load = y - force + (-self.s0 if name == "F+" else self.s0)
-        return load, v - first, a - second, jerk - third
+        return y - force - {"F+": 1, "F-": -1}[name] * self.s0, v - first, a - second, jerk - third
 
     def joint(self, z: list[Any], i: int) -> Any:
         """Return joint i, the last one by periodicity or symmetry."""
@@ -133,9 +134,8 @@ class Scene:
         (phase, x), (end, y), tau = self.joint(z, i), self.joint(z, i + 1), self.duration(z, i)
         direction, side = self.segments[i]
         if not direction:
-            f, rate, *_ = self.force(end)
-            load, slope = y - f - side * self.s0, -rate / self.omega
-            return [y - x, load], ((0, -1), (0, 0)), ((0, 1), (slope, 1))
+            (f, rate, *_), start = self.force(end), ((0, -1), (0, 0))
+            return [y - x, y - f - side * self.s0], start, ((0, 1), (-rate / self.omega, 1))
         reached, v, last, (c, dc, d, dd), _ = self.state(z, i, tau)
         first = (self.force(phase)[0] - x - direction * self.s) / self.omega
         own = (-first * d, c), (-first * dd, dc)

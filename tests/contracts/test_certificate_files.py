@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 
 import contfric as cf
 from contfric.base.extras import MissingPackageError
@@ -25,7 +26,7 @@ from contfric.cli import main
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 from contfric.verify.file import check_text
-from tests.certificate_oracle import copied, false_statements, mutated
+from tests.certificate_oracle import Truth, copied, false_statements, mutated
 
 CHECKER = Path(cf.__file__).parent / "verify"
 SCENES: list[tuple[str, dict[str, float]]] = [
@@ -142,6 +143,24 @@ def test_what_nobody_looks_at_is_not_in_a_file() -> None:
         assert not check_text(json.dumps(data | change)).yes, change
     for name in data:
         assert not check_text(json.dumps({k: v for k, v in data.items() if k != name})).yes
+
+
+@pytest.mark.parametrize("index", range(len(SCENES)))
+def test_a_number_just_out_of_its_ball_is_refused(index: int) -> None:
+    """By less than an interval arithmetic with radii of 30 bits rounds; and what is just inside may pass."""
+    rng, data = np.random.default_rng(index), json.loads(certificate(index))
+    with mp.workdps(60):
+        truth = Truth(data).newton([mpf(c) for c in data["joints"]])
+        for _ in range(30):
+            k, radius = int(rng.integers(len(truth))), mpf(f"{10.0 ** rng.uniform(-29, -2):.13e}")
+            off = radius * int(rng.choice([-1, 1]))
+            for share, yes in (
+                (1 + mpf(10) ** rng.uniform(-13, -9), False),
+                (mpf("0.99999"), True),
+            ):
+                text = f"{mp.nstr(truth[k] + share * off, 55)} +/- {mp.nstr(radius, 14)}"
+                enclosure = [*data["enclosure"][:k], text, *data["enclosure"][k + 1 :]]
+                assert check_text(json.dumps(data | {"enclosure": enclosure})).yes == yes, text
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from collections.abc import Callable
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -74,6 +75,30 @@ def test_saved_and_read(tmp_path: Path) -> None:
     (tmp_path / "c.json").write_text("{}")
     with pytest.raises(cf.ResultFileError, match=r"certificate\.json"):
         load_diagram_certificate(tmp_path / "c.json")
+
+
+def test_events_of_the_summary_are_those_that_are_checked(tmp_path: Path) -> None:
+    """Not at another value, of another kind, twice, without the part of the file that states it."""
+    proved().save(tmp_path / "c.json")
+    text = (tmp_path / "c.json").read_text()
+
+    def answer(change: Callable[[dict[str, Any]], Any]) -> files.Answer:
+        data = json.loads(text)
+        data["checkable"] = [p for p in data["checkable"] if p["certificate"] == "event"]
+        change(data)
+        (tmp_path / "d.json").write_text(json.dumps(data))
+        return files.verify(tmp_path / "d.json")
+
+    assert answer(lambda data: None).yes
+    fold = json.loads(text)["summary"]["events"][-1]
+    assert fold["kind"] == "SN"
+    for name, value in (("kind", "PD"), ("ball", "0.5419 +/- 1e-9"), ("ball", None)):
+        wrong = fold | {name: value}
+        found = answer(lambda data, wrong=wrong: data["summary"]["events"].__setitem__(-1, wrong))
+        assert not found.yes and "no part of the file states" in found.why
+    assert not answer(lambda data: data["summary"]["events"].append(fold)).yes
+    assert not answer(lambda data: data["checkable"].pop()).yes
+    assert not answer(lambda data: data.update(summary="none")).yes
 
 
 def test_a_time_limit_is_named() -> None:

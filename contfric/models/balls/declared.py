@@ -19,7 +19,8 @@ from flint import arb, arb_mat
 
 from contfric.errors import ParameterError
 from contfric.models.affine import AffineForm
-from contfric.models.balls.model import BallModel, Closure, Pairs, SignedPairs
+from contfric.models.balls.identities import alike, mirrored, moved
+from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import zeros
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
@@ -151,7 +152,7 @@ def _keeping(kept: list[list[Any]], rows: list[list[Any]], frequencies: Sequence
     n, found = len(rows), list(rows)
     if not kept:
         return found
-    rates = [[*row[:n], *_moved(row, n, frequencies)] for row in kept]
+    rates = [[*row[:n], *moved(row, n, frequencies)] for row in kept]
     reduced, pivots = sympy.Matrix(rates).rref()
     for r, pivot in enumerate(pivots):
         others = [j for j in range(n) if j not in pivots]
@@ -160,15 +161,6 @@ def _keeping(kept: list[list[Any]], rows: list[list[Any]], frequencies: Sequence
             for c in range(len(rows[0]))
         ]
     return found
-
-
-def _moved(row: list[Any], n: int, frequencies: Sequence[Any]) -> list[Any]:
-    """Return the rate of an observable with the states held fixed."""
-    rate = [sympy.Integer(0)] * len(row)
-    for k, w in enumerate(frequencies):
-        at = n + 1 + 2 * k
-        rate[at], rate[at + 1] = w * row[at + 1], -w * row[at]
-    return rate
 
 
 def _written_out(definition: str, modes: Sequence[str], surfaces: Sequence[str]) -> Description:
@@ -185,42 +177,6 @@ def _written_out(definition: str, modes: Sequence[str], surfaces: Sequence[str])
         surfaces=(*description.surfaces, *(limit for limit, _ in limits)),
         modes=tuple(map(composition.text, modes)),
     )
-
-
-@lru_cache(maxsize=4096)
-def alike(affine: AffineModel, surface: str, mode: str) -> str | None:
-    """Return the surface whose row is the rate of another one along a mode, or its negative, in symbols."""
-    n, (row,), field = affine.states, affine.surfaces[surface], affine.fields[mode]
-    still = _moved(row, n, affine.frequencies)
-    rate = [sum(row[i] * field[i][j] for i in range(n)) + c for j, c in enumerate(still)]
-    for name, (other,) in affine.surfaces.items():
-        pairs = list(zip(rate, other, strict=True))
-        if any(all(sympy.expand(a + sign * b) == 0 for a, b in pairs) for sign in (1, -1)):
-            return name
-    return None
-
-
-@lru_cache(maxsize=256)
-def mirrored(affine: AffineModel, closure: Closure, modes: Pairs, surfaces: SignedPairs) -> bool:
-    """Tell whether a symmetry of half a period maps fields, surfaces and resets to those of the images.
-
-    In symbols: ``M' D = K M``, ``g' D = -g`` or g, and ``R' D = K R``, D = diag(K, 1, (-1)^n_k), as in
-    :mod:`contfric.certify.closing`.
-    """
-    n, turns = affine.states, affine.turns
-    k = sympy.Matrix(n, n, [sympy.Rational(c) for row in closure for c in row])
-    waves = [(-1) ** turn for turn in turns for _ in range(2)]
-    d = sympy.diag(k, 1, *waves)
-
-    def gap(group: Mapping[str, list[list[Any]]], name: str, to: str, factor: Any) -> Any:
-        return sympy.Matrix(group[to]) * d - factor * sympy.Matrix(group[name])
-
-    if any((name in affine.resets) != (to in affine.resets) for name, to, _ in surfaces):
-        return False
-    gaps = [gap(affine.fields, mode, to, k) for mode, to in modes]
-    gaps += [gap(affine.surfaces, name, to, sign) for name, to, sign in surfaces]
-    gaps += [gap(affine.resets, name, to, k) for name, to, _ in surfaces if name in affine.resets]
-    return all(sympy.expand(x) == 0 for rows in gaps for x in rows)
 
 
 def _affine(formulas: Formulas, texts: list[Any], what: str, name: str) -> list[AffineForm]:
