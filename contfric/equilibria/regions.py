@@ -186,7 +186,7 @@ def regions_of(model: Model) -> tuple[ModeRegion, ...]:
         function_of_numbers(args, [[h.diff(s) for s in formulas.y] for h in texts]),
     )
     whole = {d.mode for d in model.domains}
-    fields, found = formulas.fields(), []
+    fields, found = formulas.fields, []
     for k, (mode, bits) in enumerate(itertools.product(description.modes, formulas.pieces)):
         if mode.name not in whole:
             continue
@@ -224,7 +224,7 @@ def check_no_excitation(model: Model, params: Mapping[str, float], active: str =
         for symbol, p in zip(formulas.p, formulas.description.parameters, strict=True)
         if p.name != active
     }
-    every = [*itertools.chain.from_iterable(formulas.fields()), *formulas.observables()]
+    every = [*itertools.chain.from_iterable(formulas.fields), *formulas.observables()]
     if any(formulas.t in formula.subs(known).free_symbols for formula in every):
         raise ParameterError(
             f"model '{model.name}' is excited at these parameters, and has no equilibria: switch the "

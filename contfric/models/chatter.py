@@ -146,7 +146,7 @@ class _Wall:
         self._formulas, self.surface, self.flight = formulas, surface, flight
         self.side = flight.sides[surface]
         [own] = [s for s in description.surfaces if s.name == surface]
-        field = formulas.fields()[[m.name for m in description.modes].index(flight.name)]
+        field = formulas.fields[[m.name for m in description.modes].index(flight.name)]
         height = formulas.heights()[surface]
         self._rate = formulas.rate(height, field)
         self.lift = sympy.simplify(formulas.rate(self._rate, field))

@@ -60,7 +60,7 @@ class CrossingSurfaces:
         modes = _quadrants(description, surfaces)
         self.others = {s: v for s, v in modes[1, 1].sides.items() if s not in surfaces}
         names = [mode.name for mode in description.modes]
-        fields, heights = formulas.fields(), [formulas.heights()[name] for name in surfaces]
+        fields, heights = formulas.fields, [formulas.heights()[name] for name in surfaces]
         f = {signs: fields[names.index(mode.name)] for signs, mode in modes.items()}
         self._check_sum(f)
         self.mean = [sum(row) / 4 for row in zip(*f.values(), strict=True)]

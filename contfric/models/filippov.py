@@ -184,7 +184,7 @@ class _Sliding:
         self.surface, self.name, self.text = surface, name, formulas.text
         self.sides = {s: v for s, v in {**above.sides, **below.sides}.items() if s != surface}
         names = [m.name for m in description.modes]
-        fields, height = formulas.fields(), formulas.heights()[surface]
+        fields, height = formulas.fields, formulas.heights()[surface]
         up, down = (fields[names.index(mode.name)] for mode in (above, below))
         on = _known_on(formulas, height)
         self.rate_up, self.rate_down = (formulas.rate(height, f).subs(on) for f in (up, down))

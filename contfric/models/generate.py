@@ -80,9 +80,10 @@ def module_source(description: Description, digest: str) -> str:
     code.add(_HEAD.format(digest=digest))
     writer = _Writer(code, formulas)
     closed, seen = writer.linear()
-    writer.vectors("field", "mode", "out", formulas.fields())
+    writer.vectors("field", "mode", "out", formulas.fields)
     writer.scalars("observe_at(c, t, y, p, which, grad)", "c", formulas.observables())
-    writer.rates(formulas.rates())
+    rates = formulas.rates()
+    writer.rates(rates)
     levels, resets = formulas.levels(), formulas.resets()
     writer.of_parameters("level(k, p, which, grad)", "k", [levels[names.index(n)] for n in order])
     writer.of_parameters("period(p, which, grad)", None, [formulas.period()])
@@ -92,7 +93,7 @@ def module_source(description: Description, digest: str) -> str:
     timed = [
         c for c, o in enumerate(formulas.observables()) if not o.free_symbols & set(formulas.y)
     ]
-    idle = _idle(description, formulas.rates())
+    idle = _idle(description, rates)
     code.add(motion_code(description, idle, timed, closed, seen))
     return str(code)
 

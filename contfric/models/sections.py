@@ -13,7 +13,8 @@ import itertools
 import random
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.definition import Domain, Surface
@@ -75,7 +76,7 @@ def _sought(description: Description) -> dict[str, str]:
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     acts = description.acts.items()
     mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
-    fields, going_on = _SampledFields(description), True
+    fields, going_on = _Fields(description), True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
@@ -134,8 +135,8 @@ def _between(
     return found
 
 
-class _SampledFields:
-    """The fields of modes at some states, each evaluated once."""
+class _Fields:
+    """The fields of modes, at some states and as formulas, each evaluated once."""
 
     def __init__(self, description: Description) -> None:
         self.description = description
@@ -167,7 +168,33 @@ class _SampledFields:
         samplers = [Sampler(floats(self.description), p) for p in _parameters(self.description)]
         if any(_jumps(sampler, a, s) for sampler in samplers for s in between):
             return False
-        return _same_formulas(self.description, a.name, b.name)
+        return self._same_formulas(a.name, b.name)
+
+    def _same_formulas(self, a: str, b: str) -> bool:
+        """Tell whether the fields of two modes are the same formulas, resolved on their sides."""
+        import sympy
+
+        try:
+            one, other = self._formulas[a], self._formulas[b]
+        except ModelError:
+            return False  # whoever builds the model says what is wrong, and where
+        return all(
+            x == y or sympy.expand(x - y) == 0
+            for here, there in zip(one, other, strict=True)
+            for x, y in zip(here, there, strict=True)
+        )
+
+    @cached_property
+    def _formulas(self) -> dict[str, list[Any]]:
+        """The fields of each mode on its pieces."""
+        from contfric.models.symbols import Formulas
+
+        formulas = Formulas(self.description)
+        fields, pieces = formulas.fields, len(formulas.pieces)
+        return {
+            mode.name: fields[k * pieces : (k + 1) * pieces]
+            for k, mode in enumerate(self.description.modes)
+        }
 
 
 def _parameters(description: Description) -> list[dict[str, float]]:
@@ -211,26 +238,6 @@ def _jumps(sampler: Sampler, mode: ModeText, surface: str) -> bool:
         if any(abs(u - d) > _JUMP * (1.0 + abs(u)) for u, d in zip(up, down, strict=True)):
             return True
     return False
-
-
-def _same_formulas(description: Description, a: str, b: str) -> bool:
-    """Tell whether the fields of two modes are the same formulas, resolved on their sides."""
-    import sympy
-
-    from contfric.models.symbols import Formulas
-
-    try:
-        formulas = Formulas(description)
-        fields, pieces = formulas.fields(), len(formulas.pieces)
-    except ModelError:
-        return False  # whoever builds the model says what is wrong, and where
-    names = [mode.name for mode in description.modes]
-    one, other = (fields[names.index(name) * pieces :][:pieces] for name in (a, b))
-    return all(
-        x == y or sympy.expand(x - y) == 0
-        for here, there in zip(one, other, strict=True)
-        for x, y in zip(here, there, strict=True)
-    )
 
 
 def join_domains(domains: tuple[Domain, ...], first: Mapping[str, str]) -> tuple[Domain, ...]:

@@ -84,8 +84,9 @@ class Formulas:
         """Return the period, or 0."""
         return self.read(("period",), self.description.period or "0")
 
+    @cached_property
     def fields(self) -> list[list[Any]]:
-        """Return the field of each piece of each mode, without the kinks that the piece does not see."""
+        """The field of each piece of each mode, without the kinks that the piece does not see."""
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
@@ -126,8 +127,8 @@ class Formulas:
         """
         method = self.description.method
         if method != "explicit":
-            return [f"the model asks for the method '{method}'" for _ in self.fields()]
-        return [self.affine(field) for field in self.fields()]
+            return [f"the model asks for the method '{method}'" for _ in self.fields]
+        return [self.affine(field) for field in self.fields]
 
     @property
     def pieces(self) -> list[tuple[int, ...]]:
@@ -144,7 +145,8 @@ class Formulas:
 
     def rates(self) -> list[list[Any]]:
         """Return the rate of each observable along each piece of each mode."""
-        return [[self.rate(o, field) for o in self.observables()] for field in self.fields()]
+        observables = self.observables()
+        return [[self.rate(o, field) for o in observables] for field in self.fields]
 
     def projections(self) -> list[list[Any]]:
         """Return the state on the surfaces that each mode moves on, near a state: one Newton step.
@@ -180,7 +182,7 @@ class Formulas:
         from_0 = {k for k, low in enumerate(lowest) if low is not None and low == 0}
         if not from_0:
             return []
-        return sorted(set().union(*(self._kept(from_0, field) for field in self.fields())))
+        return sorted(set().union(*(self._kept(from_0, field) for field in self.fields)))
 
     def _kept(self, kept: set[int], field: list[Any]) -> set[int]:
         """Return those of some states that stay 0 in a field where they are 0 together, and else move."""

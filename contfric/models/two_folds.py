@@ -174,7 +174,7 @@ def _pairs(model: Model) -> Iterator[tuple[str, str, str]]:
 def _formulas(description: Description) -> tuple[Formulas, list[list[Any]]]:
     """Return a description as formulas, and its fields: the same for all of its surfaces."""
     formulas = Formulas(description)
-    return formulas, formulas.fields()
+    return formulas, formulas.fields
 
 
 @dataclass(frozen=True, eq=False)

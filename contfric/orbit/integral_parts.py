@@ -326,9 +326,8 @@ def left_over(column, size, enough):  # type: ignore[no-untyped-def]
         value, mirrored = column[k], column[NODES - 1 - k]
         top = max(top, abs(value), abs(mirrored))
         even, odd = value + mirrored, value - mirrored
-        a += (
-            _LAST[k, 0] * even
-        )  # sums next to each other: each alone would wait for its own last term
+        # sums next to each other: each alone would wait for its own last term
+        a += _LAST[k, 0] * even
         b += _LAST[k, 1] * odd
         c += _LAST[k, 2] * even
         d += _LAST[k, 3] * odd

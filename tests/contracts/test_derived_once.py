@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from contfric.base.resources import bundled_dir
-from contfric.models import build, files, sections
+from contfric.models import build, files, sections, symbols
 from contfric.models.describe import describe
 from contfric.models.library import bundled, find
 
@@ -120,3 +120,36 @@ def test_modes_are_joined_once(fresh_cache, monkeypatch):
     monkeypatch.setattr(sections, "_sought", None)
     assert sections.joined_modes(description) == first
     sections._joined.cache_clear()
+
+
+def test_the_fields_of_modes_that_are_compared_are_derived_once(monkeypatch):
+    """Two contacts whose friction depends on the velocity have many pairs of modes with one field."""
+    friction = {"kind": "friction", "kinetic": "S/(1 + abs(v{0} - 0.2))", "velocity": "v{0} - 0.2"}
+    pads = {
+        f"pad{k}": {key: text.format(k) for key, text in friction.items()} | {"static": "1.2*S"}
+        for k in (1, 2)
+    }
+    description = describe(
+        {
+            "name": "two-pads",
+            "coordinates": ["q1", "q2"],
+            "parameters": {"Omega": 0.9, "S": 0.2},
+            "period": "2*pi/Omega",
+            "mass": "identity",
+            "damping": [[0.03, 0.0], [0.0, 0.03]],
+            "stiffness": [[2.0, -0.5], [-0.5, 2.0]],
+            "force": {"q1": "cos(Omega*t)"},
+            "contacts": pads,
+        }
+    )
+    made = []
+
+    class Counted(symbols.Formulas):
+        def __init__(self, description):
+            made.append(description.name)
+            super().__init__(description)
+
+    monkeypatch.setattr(symbols, "Formulas", Counted)
+    first = sections._sought(description)
+    assert len(first) - len(set(first.values())) > 2
+    assert made == ["two-pads"]

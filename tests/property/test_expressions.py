@@ -288,7 +288,7 @@ def test_a_factor_of_parameters_hides_no_kink(seed: int) -> None:
     description = describe(data)
     formulas = Formulas(description)
     moving = (formulas.t, *formulas.y)
-    assert not any(kinks_in(f, moving) for field in formulas.fields() for f in field)
+    assert not any(kinks_in(f, moving) for field in formulas.fields for f in field)
     module, values = load_module(description.motion), [p.default for p in description.parameters]
     surfaces = {s.name: s for s in description.surfaces}
     for _ in range(20):

@@ -108,12 +108,25 @@ def turn(pairs, count, time, w, into):  # type: ignore[no-untyped-def]
 
 
 @helper
+def double_once(ladder, level, pairs, count, system):  # type: ignore[no-untyped-def]
+    """Write the responses over twice as many steps, 2^(level + 1), to ``pairs.once``."""
+    once, other, n = pairs.once, pairs.other, pairs.once.shape[1]
+    for r in range(2 * count):
+        for i in range(n):
+            other[r, i] = once[r, i]
+        add_product(other, r, once, r, ladder.powers[level])
+    turn(pairs, count, math.ldexp(ladder.head[H], level), system.w, other)
+    for r in range(2 * count):
+        for i in range(n):
+            once[r, i] = other[r, i]
+
+
+@helper
 def double(ladder, k, pairs, count, system):  # type: ignore[no-untyped-def]
     """Write the responses over k steps to ``pairs.total``."""
     h, done, levels = ladder.head[H], 0.0, levels_of(k)
     extend(ladder, levels)
-    once, other, total = pairs.once, pairs.other, pairs.total
-    n = once.shape[1]
+    other, total, n = pairs.other, pairs.total, pairs.once.shape[1]
     for r in range(2 * count):
         for i in range(n):
             total[r, i] = 0.0
@@ -128,14 +141,7 @@ def double(ladder, k, pairs, count, system):  # type: ignore[no-untyped-def]
             done += length
         if level + 1 == levels:
             break
-        for r in range(2 * count):
-            for i in range(n):
-                other[r, i] = once[r, i]
-            add_product(other, r, once, r, step)
-        turn(pairs, count, length, system.w, other)
-        for r in range(2 * count):
-            for i in range(n):
-                once[r, i] = other[r, i]
+        double_once(ladder, level, pairs, count, system)
 
 
 @helper

@@ -71,17 +71,23 @@ def sight_in(memory, at, n, entries):  # type: ignore[no-untyped-def]
 
 
 @helper
+def observable_row(motion, c, co, h, system, out):  # type: ignore[no-untyped-def]
+    """Write the factors of the states in an observable."""
+    silence, unit, value = system.waves[4], system.other, system.work[0]
+    for i in range(out.shape[0]):
+        unit[0, i] = 0.0
+    for i in range(out.shape[0]):
+        unit[0, i] = 1.0
+        motion.look(c, co, silence, silence, silence, h, 0, unit, value)
+        unit[0, i] = 0.0
+        out[i] = value[0]
+
+
+@helper
 def write_rows(motion, c, h, ladder, sight, system):  # type: ignore[no-untyped-def]
     """Write W of a step."""
-    n, silence, unit, value = system.work.shape[1], system.waves[4], system.other, system.work[0]
-    row, following = 1, 2
-    for i in range(n):
-        unit[0, i] = 0.0
-    for i in range(n):
-        unit[0, i] = 1.0
-        motion.look(c, sight.co, silence, silence, silence, h, 0, unit, value)
-        unit[0, i] = 0.0
-        system.work[row, i] = value[0]
+    n, row, following = system.work.shape[1], 1, 2
+    observable_row(motion, c, sight.co, h, system, system.work[row])
     for m in range(TERMS + 1):
         for i in range(n):
             sight.rows[i, m] = system.work[row, i]
@@ -95,7 +101,7 @@ def write_rows(motion, c, h, ladder, sight, system):  # type: ignore[no-untyped-
 
 @helper
 def write_waves(motion, piece, h, sight, seen, system):  # type: ignore[no-untyped-def]
-    """Write P and Q of each harmonic for a step, two rows each."""
+    """Write P and Q of each harmonic for a step, two rows each, from their first terms on."""
     n, silence, phase, work = system.work.shape[1], system.waves[4], system.waves[5], system.work
     scratch = seen.shape[0] - 2
     for i in range(n):
@@ -112,7 +118,6 @@ def write_waves(motion, piece, h, sight, seen, system):  # type: ignore[no-untyp
                 seen[scratch + q, m] = 0.0
             add_product(seen, scratch + q, work, 1 + q, sight.rows)
         p, q = seen[2 * j], seen[2 * j + 1]
-        p[0] = q[0] = 0.0
         for m in range(TERMS):
             f, a, b = h / (m + 1.0), seen[scratch, m], seen[scratch + 1, m]
             p[m + 1], q[m + 1] = f * (a + system.w[j] * q[m]), f * (b - system.w[j] * p[m])
@@ -141,6 +146,8 @@ def sight_of(motion, piece, c, rate, spread, grown, dt, co, memory, space, seen,
         for j in range(entries):
             sight.co[j] = co[j]
         write_rows(motion, c, step, ladder, sight, system)
+    for r in range(2 * waves):
+        seen[r, 0] = 0.0
     write_waves(motion, piece, step, sight, seen, system)
     by, count = -1, -1
     if dt > _ONE_STEP * step:
@@ -159,12 +166,17 @@ def sight_of(motion, piece, c, rate, spread, grown, dt, co, memory, space, seen,
 
 
 @helper
-def write_seen(motion, c, memory, at, t, y, h, step, terms, seen, system, poly):  # type: ignore[no-untyped-def]
-    """Write the Taylor terms of an observable along a step; ``system.other`` has those of rest."""
+def write_seen(motion, c, memory, at, t, lag, y, h, step, terms, seen, system, poly):  # type: ignore[no-untyped-def]
+    """Write the Taylor terms of an observable along a step that begins ``lag`` after the time of a state.
+
+    ``system.other`` has the terms of rest.
+    """
     n, waves, w = y.shape[0], system.waves, system.w
     sight = sight_in(memory, at, n, system.co.shape[0])
-    start_waves(system, t)
+    start_waves(system, t + lag)
     motion.look(c, sight.co, waves[0], waves[1], w, h, terms, system.other, poly)
+    if lag != 0.0:
+        start_waves(system, t)
     total, rows = seen.shape[0] - 1, system.work[:1]
     for i in range(n):
         rows[0, i] = y[i]

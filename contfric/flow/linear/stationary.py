@@ -9,6 +9,7 @@ import numpy as np
 from contfric.compiled import allocating_helper, inlined_helper
 from contfric.compiling.shared import numbers_at, unlock
 from contfric.flow.folding import folded
+from contfric.flow.linear.decayed import LAG, advance_long, begin_long, enter_level, rounded_up
 from contfric.flow.linear.kept import NUMBERS, locked, space_of
 from contfric.flow.linear.responses import pairs_space
 from contfric.flow.linear.search import (
@@ -34,9 +35,9 @@ _OTHER_STEPS = 1.0873
 
 
 @inlined_helper
-def stationary_in_step(poly, slope, first, terms, sign, done, h, span, count, times, values):  # type: ignore[no-untyped-def]
+def stationary_in_step(poly, slope, first, terms, sign, done, h, bound, span, count, times, values):  # type: ignore[no-untyped-def]
     """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
-    bound, behind = sixth_of(slope, first, terms), 0.0
+    behind = 0.0
     while behind < 1.0:
         at, behind = first_root(slope, first, terms, behind, sign, bound)
         if math.isnan(at):
@@ -55,18 +56,32 @@ def stationary_in_step(poly, slope, first, terms, sign, done, h, span, count, ti
 @inlined_helper
 def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys, times, values):  # type: ignore[no-untyped-def]
     """Write the interior stationary points of an observable; return their number, or -1."""
-    rate, spread = reach
+    rate, spread, grown, y0 = reach
     y, near, poly, slope = system.work[4], _AT_JOINT * (1.0 + dt), polys[0], polys[1]
     span = (min(near, 0.5 * dt), max(dt - near, 0.5 * dt))
     done, sign, count = 0.0, 0.0, 0
     place, at, by, step, forces, memory, pairs, waves = seen
+    late, level, lag = (memory, pairs, waves), -1, 0.0
+    powers, begin = begin_long(motion, piece, rate, spread, grown, dt, memory, system)
     while done < dt:
-        h = next_length(rate if at < 0 else REACH / step, dt - done)
-        terms, first, size = terms_for(rate * h, spread), 0, 0.0
+        if done >= begin:
+            following, length, count_of = enter_level(
+                motion, piece, c, level + 1, forces, rate, spread, powers, sight, late, system
+            )
+            begin = 2.0 * done if following >= 0 else math.inf
+            if following >= 0:
+                level, at, step, forces, lag = level + 1, following, length, count_of, LAG * length
+                for i in range(y.shape[0]):
+                    y[i] = y0[i]
+        left = min(dt, begin) - done
+        h = min(step, left) if level >= 0 else next_length(rate if at < 0 else REACH / step, left)
+        terms, first, size = TERMS if level >= 0 else terms_for(rate * h, spread), 0, 0.0
         if at < 0:
             write_series(motion, piece, sight, c, 0.0, t0 + done, y, h, terms, system, poly)
         else:
-            write_seen(motion, c, memory, at, t0 + done, y, h, step, terms, waves, system, poly)
+            write_seen(
+                motion, c, memory, at, t0 + done - lag, lag, y, h, step, terms, waves, system, poly
+            )
         for k in range(1, terms + 1):
             slope[k - 1] = k * poly[k]
             size += abs(poly[k])
@@ -82,13 +97,16 @@ def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys
                             return -1
                         times[count], values[count] = done, poly[0]
                         count += 1
+                bound = rounded_up(sixth_of(slope, first, terms - 1), level, rate, step)
                 count, sign = stationary_in_step(
-                    poly, slope, first, terms - 1, sign, done, h, span, count, times, values
+                    poly, slope, first, terms - 1, sign, done, h, bound, span, count, times, values
                 )
                 if count < 0:
                     return -1
         if at < 0:
             state_at(system.series, terms, 1.0, y)
+        elif level >= 0:
+            advance_long(powers, level, forces, t0 + done - lag, y, late, system)
         elif h != dt - done:
             advance_seen(memory, place, by, t0 + done, y, forces, pairs, system)
         done = dt if h == dt - done else done + h
@@ -132,13 +150,14 @@ def search_stationary(motion, piece, c, t, y0, dt, p, none, workspace, times, va
         )
         if math.isnan(rate):
             return -1
-        reach = (rate * shorter, spread)
+        reach = (rate * shorter, spread, grown, y0)
         place, at, by, step, forces = -1, -1, -1, 0.0, -1
         if memory.shape[0] > 0 and shorter == 1.0:
             place, at, by, step, forces = sight_of(
                 motion, piece, c, rate, spread, grown, dt, sight, memory, pairs, waves, system
             )
-        seen = (place, at, by, step, forces, memory, pairs, waves)
+        kept = memory if shorter == 1.0 else memory[:0]  # and then neither long steps
+        seen = (place, at, by, step, forces, kept, pairs, waves)
         found = stationary_in(
             motion, piece, c, t, dt, p, reach, system, sight, seen, workspace[3], times, values
         )

@@ -111,7 +111,7 @@ def affine_model(
     if description.kinks:
         raise not_offered(name, f"its fields have kinks ({', '.join(description.kinks)})")
     fields = {}
-    for mode, rates in zip(description.modes, formulas.fields(), strict=True):
+    for mode, rates in zip(description.modes, formulas.fields, strict=True):
         fields[mode.name] = _affine(formulas, rates, f"mode {mode.name}", name)
     heights = formulas.heights().items()
     surfaces = {surface: _affine(formulas, [above], surface, name) for surface, above in heights}
