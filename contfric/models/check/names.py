@@ -97,12 +97,8 @@ def check_kinks(report: ModelReport, model: Model) -> None:
     symbols = (*formulas.y, *formulas.p)
     names = dict(zip(symbols, (*model.states, *model.parameter_names), strict=True))
     modes = [mode for mode in model.modes for _ in formulas.pieces]
-<<<<<<< HEAD
     said = set[tuple[str, ...]]()  # the parts of a mode that a section divides have one field
-    for mode, field in zip(modes, formulas.fields(), strict=True):
-=======
     for mode, field in zip(modes, formulas.fields, strict=True):
->>>>>>> h3
         for state, rate in zip(model.states, field, strict=True):
             report.count(Topic.KINKS)
             for kink in kinks_in(rate, (formulas.t, *formulas.y)):
