@@ -107,7 +107,7 @@ def march(arc: Arc, start: CurvePoint, limits: MarchLimits) -> Run:
 def _is_start(crossing: LocatedSignChange, start: CurvePoint) -> bool:
     """Tell whether an event is the boundary that a run begins on: its height there is rounding."""
     on_surface = crossing.test not in ("SN", "BP", "H")
-    return on_surface and bool(np.max(np.abs(crossing.place.x - start.x)) < _AT_START)
+    return on_surface and bool(np.max(np.abs(crossing.point.x - start.x)) < _AT_START)
 
 
 class _Closing:
