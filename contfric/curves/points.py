@@ -156,7 +156,9 @@ def returned(problem: Conditioned, start: Point, marched: Marched) -> int | None
     rows, last = marched.rows, slice(marched.first - 1, marched.stop)
     near = 1.5 * np.diff(rows.arc[last])
     gaps = np.max(np.abs(rows.w[last][1:] - start.w) / problem.box.widths, axis=1)
-    left = rows.arc[last][1:] - start.arc > 2.0 * near  # the first steps, each longer, are near, too
+    left = (
+        rows.arc[last][1:] - start.arc > 2.0 * near
+    )  # the first steps, each longer, are near, too
     for k in np.flatnonzero(left & (gaps <= near)).tolist():
         row = marched.first + k
         if _passes(problem, start, rows.point(row - 1), rows.point(row), float(near[k])):
