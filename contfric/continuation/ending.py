@@ -21,10 +21,14 @@ from contfric.errors import NotationError
 from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
+from contfric.orbit.sections import is_smooth
 from contfric.orbit.slides import SHORT
 
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5
+#: Near a point an orbit is an ellipse, but for terms of the second order of its size: where that is below the
+#: first, they are below the second.
+_SMALL, _LINEAR = 0.05, 0.1
 #: Flights this high (relative to 1 + the states) between contacts are about to vanish: their impacts have
 #: speeds near the root of rounding, and no limit that is known to more than a few digits.
 _NO_HEIGHT = 1e-8
@@ -55,6 +59,21 @@ def is_point(orbit: Orbit) -> bool:
     )  # a clock that ticks is no point
     least = _NO_SIZE * (1.0 + np.abs(states).max())
     return bool(np.ptp(states, axis=0).max() < least) and orbit.x_max - orbit.x_min < least
+
+
+def passes_point(before: Orbit, after: Orbit) -> bool:
+    """Tell whether a smooth autonomous orbit shrinks to a point between two: beyond it joints change places.
+
+    Near an equilibrium that begins to oscillate they are linear in the amplitude, which changes its sign.
+    """
+    if not before.model.autonomous or not is_smooth(before.model, before.itinerary):
+        return False
+    apart = [o.begins[:, 1:] - o.begins[:, 1:].mean(axis=0) for o in (before, after)]
+    sizes = [float(np.linalg.norm(a)) for a in apart]
+    if not 0.0 < max(sizes) < _SMALL * (1.0 + float(np.abs(before.begins[:, 1:]).max())):
+        return False
+    between = (apart[0] * sizes[1] + apart[1] * sizes[0]) / sum(sizes)
+    return float(np.linalg.norm(between)) < _LINEAR * min(sizes)
 
 
 def never_leaves(orbit: Orbit) -> bool:

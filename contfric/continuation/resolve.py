@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.continuation.accuracy import not_critical
-from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves
+from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves, passes_point
 from contfric.continuation.events import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.continuation.limits import ends_at_limit, is_at_limit, limit_crossed, limit_end
 from contfric.continuation.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
@@ -53,13 +53,19 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         side.end = End(EndReason.POINT)
         return True
     fails = violates(after if limit is None else limit[0])
+    active = orbit.model.index_of(settings.parameter)
+    shrinks = fails and passes_point(before.orbit(orbit, active), after.orbit(orbit, active))
     at_limit = fails and ends_at_limit(located, before, after, settings)
     if at_limit:
         side.drop_tip()
         side.end = limit_end(before.value, settings)
         return True
-    if _comes_closer(side, located, at_limit is None, after.arc - before.arc):
+    if _comes_closer(side, located, at_limit is None or shrinks, after.arc - before.arc):
         return False
+    if shrinks:
+        side.drop_tip()
+        side.end = End(EndReason.POINT)
+        return True
     if located and is_on_section(located[0][0]):
         side.drop_tip()
         if move_joints(orbit, side, settings):
@@ -148,8 +154,8 @@ def _comes_closer(
     """Go back to the point before an event near which Newton fails, and on in shorter steps.
 
     Where two curves of orbits cross, Newton converges from no farther than the crossing is away: a step
-    across may end on the other curve, and what is between its ends belongs to neither. And whether a branch
-    ends at a limit may be ``undecided``.
+    across may end on the other curve, and what is between its ends belongs to neither. And it may be
+    ``undecided`` whether a branch ends at a limit, or at how small an orbit.
     """
     fails = undecided or any(point.lost or point.rough for _, point in located)
     if not fails or step < NEAREST:

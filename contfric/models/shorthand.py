@@ -38,6 +38,8 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     """
     if not data["surfaces"] and not data["modes"] and "field" in data:
         data = {**data, **_smooth(data)}
+    elif not data["surfaces"] and len(data["modes"]) == 1:
+        data = {**data, **_smooth_mode(data)}
     data = centred(_with_observables(_with_period(with_ties_put_in(data))))
     data, parts = _divided_by_resets(data)
     walls, data = _chattering(data)
@@ -70,6 +72,17 @@ def _smooth(data: Mapping[str, Any]) -> dict[str, Any]:
         "surfaces": {"section": {"observable": rate, "level": "0"}},
         "modes": {mode: {"in": {"section": side}} for mode, side in sides.items()},
     }
+
+
+def _smooth_mode(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the same of the only mode of a model without excitation, which keeps its name."""
+    [(name, mode)] = data["modes"].items()
+    field = mode.get("field") or data.get("field", {})
+    parts = _smooth({**data, "field": field})
+    if "surfaces" not in parts:
+        return {}
+    modes = zip((name, f"{name}-"), parts["modes"].values(), strict=True)
+    return {**parts, "modes": {own: {**mode, **sides} for own, sides in modes}}
 
 
 def _divided(

@@ -29,7 +29,7 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
     widths = np.abs(model.spread(model.mapping(probe.vector)))
     sizes = dict(zip(model.states, widths.tolist(), strict=True))
     report.count(Topic.SCALES)
-    _apart(report, sizes, "sizes ('spread')", "give it a unit in which it is of order 1")
+    apart = _apart(report, sizes, "sizes ('spread')", "give it a unit in which it is of order 1")
     rates = [
         np.abs(probe.field(mode.name, *place))
         for mode in model.modes
@@ -44,12 +44,9 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
         for state, width, rate in zip(model.states, widths, fastest, strict=True)
         if rate > 0.0 and width > 0.0
     }
-    _apart(
-        report,
-        times,
-        "times of change ('spread' over the largest rate)",
-        "give their sizes in 'spread'",
-    )
+    if not apart:  # else these differ for that reason
+        what = "times of change ('spread' over the largest rate)"
+        _apart(report, times, what, "give their sizes in 'spread'")
     typical = min(times.values(), key=lambda v: abs(math.log(v)), default=1.0)
     _propose_units(report, probe, sizes, typical)
 
@@ -121,14 +118,17 @@ def _forced_sizes(probe: Probe) -> dict[str, float]:
     return dict(zip(model.states, np.abs(np.linalg.solve(system, force)).tolist(), strict=True))
 
 
-def _apart(report: ModelReport, values: dict[str, float], what: str, advice: str) -> None:
+def _apart(report: ModelReport, values: dict[str, float], what: str, advice: str) -> bool:
+    """Note the smallest and the largest of some values where they are far apart; return whether they are."""
     known = {name: v for name, v in values.items() if 0.0 < v < math.inf}
     if not known:
-        return
+        return False
     small, large = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
-    if known[large] > _APART * known[small]:
+    apart = known[large] > _APART * known[small]
+    if apart:
         report.note(
             Topic.SCALES,
             f"{what} of '{small}' ({known[small]:.1g}) and '{large}' ({known[large]:.1g}) are far apart: "
             f"{advice}",
         )
+    return apart
