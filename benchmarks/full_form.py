@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import build_system
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray
+from contfric.models.mode_domains import is_section
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
-from contfric.orbit.structure import is_section
-from contfric.orbit.system import build_system
 from contfric.signature import crossing
 
 

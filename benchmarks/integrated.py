@@ -31,8 +31,8 @@ import lugre_integrated
 import lugre_period
 
 from contfric.compiled import f8, vector
-from contfric.flow import forced_oscillator
 from contfric.flow.integrated import Method
+from contfric.flow.oscillator import flow as forced_oscillator
 
 ROOT = Path(__file__).resolve().parents[1]
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 import contfric as cf
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
-from contfric.continuation.side import first_point
 from contfric.continuation.switching import null_vector
 from contfric.orbit.solve import refine
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import contfric as cf
-from contfric.models.build import GeneratedFlow
+from contfric.models.generated.build import GeneratedFlow
 
 PLACES = (0.2, 0.32, 0.38)
 OURS, THEIRS, EXACT = (1e-10, 1e-11, 1e-12), (1e-10, 1e-12, 1e-14), 1e-14

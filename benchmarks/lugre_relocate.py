@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.models.describe import from_text
 from contfric.models.files import model_of
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 
 #: What is varied: tolerance of the integration; phase of the cut with the largest step.
 TOLERANCES = (1e-11, 1e-12, 1e-13)

@@ -22,7 +22,7 @@ from origin import origin, renewed
 
 import contfric as cf
 from contfric.chaos.rows import FollowingLimits, follow
-from contfric.orbit.simulation import Trajectory, tables
+from contfric.simulation.simulate import Trajectory, tables
 
 PAGE = Path(__file__).parents[1] / "docs" / "lyapunov.md"
 BEGIN = "<!-- begin of benchmarks/lyapunov_models.py -->"

@@ -21,9 +21,9 @@ from peers.oscillator import Failure
 from settings import OMEGA, orbit_at
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 mpl.use("Agg")

@@ -30,12 +30,7 @@ if TYPE_CHECKING:
     from contfric.chaos.exponents import lyapunov_exponent as lyapunov_exponent
     from contfric.chaos.map import LyapunovMap as LyapunovMap
     from contfric.chaos.status import Motion as Motion
-    from contfric.continuation.adding import Window as Window
-    from contfric.continuation.adding import period_adding as period_adding
     from contfric.continuation.branch import Branch as Branch
-    from contfric.continuation.events import Bifurcation as Bifurcation
-    from contfric.continuation.events import EndReason as EndReason
-    from contfric.continuation.events import Kind as Kind
     from contfric.continuation.trace import continue_orbit as continue_orbit
     from contfric.curves.curve import Curve as Curve
     from contfric.curves.extremum import ExtremumCurve as ExtremumCurve
@@ -67,6 +62,9 @@ if TYPE_CHECKING:
     from contfric.errors import ParameterError as ParameterError
     from contfric.errors import ResultFileError as ResultFileError
     from contfric.errors import StudyError as StudyError
+    from contfric.events.bifurcation import Bifurcation as Bifurcation
+    from contfric.events.bifurcation import EndReason as EndReason
+    from contfric.events.bifurcation import Kind as Kind
     from contfric.fitting.data import Jump as Jump
     from contfric.fitting.data import Measured as Measured
     from contfric.fitting.data import Series as Series
@@ -77,16 +75,17 @@ if TYPE_CHECKING:
     from contfric.models import model_names as model_names
     from contfric.models.check import ModelReport as ModelReport
     from contfric.models.check import check_model as check_model
-    from contfric.models.mechanism import Mechanism as Mechanism
     from contfric.models.oscillator import OscillatorModel as OscillatorModel
+    from contfric.models.structures.mechanism import Mechanism as Mechanism
     from contfric.models.two_folds import TwoFold as TwoFold
     from contfric.models.two_folds import find_two_folds as find_two_folds
     from contfric.orbit.find import find_orbit as find_orbit
     from contfric.orbit.gradient import Gradient as Gradient
     from contfric.orbit.orbit import Orbit as Orbit
     from contfric.orbit.resting_positions import RestingPosition as RestingPosition
-    from contfric.orbit.simulation import simulate as simulate
     from contfric.orbit.solve import solve_orbit as solve_orbit
+    from contfric.period_adding.windows import Window as Window
+    from contfric.period_adding.windows import period_adding as period_adding
     from contfric.quantities.registry import quantity_names as quantity_names
     from contfric.response.basin_map import basins as basins
     from contfric.response.basins import Basins as Basins
@@ -106,6 +105,7 @@ if TYPE_CHECKING:
     from contfric.signature import load_signature as load_signature
     from contfric.signature import signature_names as signature_names
     from contfric.signature import transition_graph as transition_graph
+    from contfric.simulation.simulate import simulate as simulate
     from contfric.study import run_study as run_study
 
 _names, _find, _ = lazily(__name__)

@@ -18,12 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.chaos.rows import check_excited
 from contfric.errors import ContfricError
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.simulation import SimulationEnd, run, simulate
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
+from contfric.simulation.simulate import SimulationEnd, run, simulate
 
 #: Instants of comparison in a period of the excitation.
 _INSTANTS = 8

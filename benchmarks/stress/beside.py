@@ -15,8 +15,8 @@ from report import Tally
 from scenes import refusal
 
 import contfric as cf
+from contfric.bvp.system import EventFunction, Margin
 from contfric.orbit.solve import refine
-from contfric.orbit.system import EventFunction, Margin
 
 #: Distance to an event in its parameter, and of a stop to a surface.
 NEAR, TOUCHING = 1e-10, 1e-12

@@ -42,7 +42,7 @@ from condition import EPS
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.orbit.system import EventFunction, Margin
+from contfric.bvp.system import EventFunction, Margin
 
 SIDE = {"F+": 1, "F-": -1}
 #: Step of the central differences: their error, of its square, is beyond the digits of a Jacobian.

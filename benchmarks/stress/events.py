@@ -17,7 +17,7 @@ from report import Report, Tally, command_line
 from scenes import Params, generator, refusal, strictly, time_limit
 
 import contfric as cf
-from contfric.continuation.events import ACCURACY
+from contfric.events.bifurcation import ACCURACY
 
 WHAT = "Events of random explorations, compared with their own equations solved in 50 digits."
 #: Accuracy that is asked of a located parameter, relative; its condition explains more.

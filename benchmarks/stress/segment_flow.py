@@ -23,7 +23,7 @@ from reference import Law, Slide, working_precision
 from report import Tally
 from segment_cases import Case
 
-from contfric.flow.forced_oscillator import flow
+from contfric.flow.oscillator.flow import flow
 
 EPS = 2.0**-52
 #: Bits for differences of differences: 200 are lost next to resonance, 80 to 120 by each difference.

@@ -29,7 +29,7 @@ from segment_cases import Case, draw_flow, draw_graze, draw_root
 from segment_flow import EPS, check_flow, parts_of
 
 from contfric.compiled import stationary_signature
-from contfric.flow.forced_oscillator import hit, stationary
+from contfric.flow.oscillator.flow import hit, stationary
 
 #: A function that is this many roundings from zero has a sign.
 LIMIT_ROOT = 30.0

@@ -37,7 +37,7 @@ from sequence_errors import EPS, Rounding, Spread
 
 import contfric as cf
 from contfric.errors import ContfricError
-from contfric.orbit.simulation import Trajectory
+from contfric.simulation.simulate import Trajectory
 
 #: Errors are of order sigma, and a decision within this many sigma is rounding's. Measured over 1.5e6
 #: events: none above 2.5, one in 500 above 1.

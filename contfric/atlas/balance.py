@@ -16,20 +16,20 @@ import numpy as np
 
 from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
 from contfric.atlas.short_branches import is_short
+from contfric.bvp.conserved import conserved
+from contfric.bvp.margins import EventFunction
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import Bifurcation, EndReason, Kind
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
-from contfric.continuation.side import first_point
-from contfric.continuation.touching import leads_elsewhere
-from contfric.continuation.unit import unit_of
 from contfric.errors import ContfricError
-from contfric.orbit.conserved import conserved
+from contfric.events.bifurcation import Bifurcation, EndReason, Kind
+from contfric.events.touching import leads_elsewhere
+from contfric.events.unit import unit_of
 from contfric.orbit.index import index_at_infinity, index_of
-from contfric.orbit.margins import EventFunction
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import simulate
 from contfric.orbit.solve import refine
+from contfric.simulation.simulate import simulate
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram, Node

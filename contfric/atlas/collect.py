@@ -8,7 +8,8 @@ from contfric.atlas.diagram import Asked, Diagram, LooseEnd, Node
 from contfric.atlas.matching import ROUNDING, same_event, same_location, telling_kind
 from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import (
+from contfric.continuation.points import Settings
+from contfric.events.bifurcation import (
     TERMINAL,
     Bifurcation,
     Decision,
@@ -17,7 +18,6 @@ from contfric.continuation.events import (
     Kind,
     Proposal,
 )
-from contfric.continuation.points import Settings
 from contfric.models.definition import Model
 
 #: Ends that the exploration goes on from.

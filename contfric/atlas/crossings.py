@@ -9,14 +9,14 @@ import numpy as np
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import settings_for
+from contfric.base.arrays import FloatArray
 from contfric.continuation.branch import Branch
 from contfric.continuation.crossing import Crossing, Direction
-from contfric.continuation.events import Decision, EndReason
 from contfric.continuation.points import FIRST_STEP, Settings
 from contfric.continuation.switching import LEAVE, leave_along
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Decision, EndReason
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

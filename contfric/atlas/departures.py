@@ -12,10 +12,9 @@ from contfric.atlas.matching import same_event
 from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
 from contfric.continuation.crossing import Direction
-from contfric.continuation.events import Decision, End, EndReason, Kind
+from contfric.continuation.events_of_step import violates
+from contfric.continuation.half_branch import Side
 from contfric.continuation.points import FIRST_STEP, Settings
-from contfric.continuation.resolve import violates
-from contfric.continuation.side import Side
 from contfric.continuation.switching import (
     NEARER,
     BranchStart,
@@ -24,6 +23,7 @@ from contfric.continuation.switching import (
     overshoots,
 )
 from contfric.continuation.trace import trace_side
+from contfric.events.bifurcation import Decision, End, EndReason, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.remember.advance import foresee

@@ -12,7 +12,7 @@ from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
 from contfric.base.tabled import stacked
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, End, Kind, Proposal
+from contfric.events.bifurcation import Bifurcation, End, Kind, Proposal
 from contfric.models.definition import Model
 from contfric.quantities.registry import QuantityLike
 
@@ -356,7 +356,7 @@ class Diagram(Shown):
         MissingPackageError
             If bokeh is not installed.
         """
-        from contfric.atlas.anew import anew
+        from contfric.atlas.other_parameters import anew
         from contfric.plot.live.serve import serve
 
         return serve(self, anew, height)

@@ -18,7 +18,9 @@ from contfric.atlas.matching import (
 )
 from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import (
+from contfric.continuation.openings import with_openings
+from contfric.continuation.points import Settings
+from contfric.events.bifurcation import (
     TERMINAL,
     Bifurcation,
     Decision,
@@ -27,8 +29,6 @@ from contfric.continuation.events import (
     Kind,
     Proposal,
 )
-from contfric.continuation.openings import with_openings
-from contfric.continuation.points import Settings
 from contfric.orbit.orbit import Orbit
 
 Progress = Callable[[str], None]

@@ -17,19 +17,19 @@ from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
-from contfric.atlas.inside import with_section
 from contfric.atlas.leaving_event import settings_for
+from contfric.atlas.one_mode import with_section
 from contfric.atlas.seeds import Seeds, attractors
 from contfric.atlas.shared_rests import shared_rest
 from contfric.atlas.short_branches import begins_at_short
 from contfric.base.attributes import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, Settings, settings_of
 from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
+from contfric.events.bifurcation import EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine

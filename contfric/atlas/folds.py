@@ -13,12 +13,12 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for
 from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
-from contfric.continuation.events import Decision, EndReason, Kind
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point
-from contfric.continuation.sequences import MOST_SEQUENCES, count, lengths, necklaces
-from contfric.continuation.side import first_point
 from contfric.continuation.switching import NEARER, start_beside
 from contfric.continuation.trace import trace_side
+from contfric.events.bifurcation import Decision, EndReason, Kind
+from contfric.events.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 

@@ -30,21 +30,21 @@ from contfric.atlas.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
 from contfric.atlas.short_branches import follow_short
 from contfric.atlas.splitting import follow_split
+from contfric.bvp.conserved import conserved
+from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, sequences_of
 from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
-from contfric.continuation.events import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
-from contfric.continuation.from_simulation import solutions_near
-from contfric.continuation.incident import incident_forms, kinds_between
-from contfric.continuation.partial_touches import partial_touches
 from contfric.continuation.points import Settings, next_to
-from contfric.orbit.conserved import conserved
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
+from contfric.events.candidates import Candidate, sequences_of
+from contfric.events.from_simulation import solutions_near
+from contfric.events.incident import incident_forms, kinds_between
+from contfric.events.partial_touches import partial_touches
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
-from contfric.orbit.system import Itinerary
 from contfric.signature import canonical_itinerary
 from contfric.signature.edits import show
 

@@ -8,20 +8,20 @@ from itertools import chain
 import numpy as np
 
 from contfric.atlas.collect import Event
+from contfric.atlas.crossing_directions import ways_in_plane
 from contfric.atlas.exploration import Exploration, Progress
-from contfric.atlas.lines import ways_in_plane
 from contfric.atlas.matching import SAME_SOLUTION
 from contfric.atlas.several_locations import opening_together
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate, directions
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason
+from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, NEARER, start_beside
 from contfric.continuation.trace import trace_side
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
+from contfric.events.candidates import Candidate, directions
 from contfric.orbit.orbit import Orbit
 
 #: First step away from an event, in largest steps: the new itinerary is proved close to it. Where the

@@ -9,15 +9,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, Kind
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, Kind
+from contfric.models.definition import Model
 from contfric.orbit.itineraries import mirror_pairs, whole_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.slides import modulo
 from contfric.orbit.solve import ended_at_surfaces, refine
-from contfric.orbit.system import Itinerary
 from contfric.signature import ReducedItinerary, canonical_itinerary
 
 #: Events whose parameters agree to their accuracy and whose solutions agree to this are one.

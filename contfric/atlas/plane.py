@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
+from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.base.tabled import stacked
-from contfric.continuation.events import Kind
 from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import Kind
+from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     import pandas as pd

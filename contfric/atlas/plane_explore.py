@@ -19,15 +19,14 @@ from contfric.atlas.plane_regions import regions_of
 from contfric.atlas.plane_sections import section_diagram, sections_of
 from contfric.atlas.plane_state import PlaneExploration, Progress
 from contfric.atlas.seeds import Seeds
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
 from contfric.continuation.points import MOST_POINTS, Point
+from contfric.curves.after_event import Start
 from contfric.curves.assembly import join_sides
 from contfric.curves.curve import CurvePart
-from contfric.curves.going_on import Start
+from contfric.curves.half_curve import CurveSide
 from contfric.curves.leaving import leaving, other_itineraries
 from contfric.curves.problem import Problem, problem_of
 from contfric.curves.ranges import box_of
-from contfric.curves.side import CurveSide
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import first_points, largest_step, start_of_curve, trace_curve_side
 from contfric.errors import (
@@ -39,6 +38,7 @@ from contfric.errors import (
     shown,
     whole_number,
 )
+from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.remember.journal import remembered
 

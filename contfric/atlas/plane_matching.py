@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.atlas.matching import identity, stops_distance
-from contfric.continuation.events import TERMINAL, Kind
+from contfric.base.arrays import FloatArray
 from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem, border_of
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import TERMINAL, Kind
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 
 #: A point farther than this from a polyline (relative to the ranges) is not on its curve: a step bends by

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.matching import identity_of
 from contfric.atlas.plane import Family, Region
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import held_back
+from contfric.bvp.system import Itinerary
 from contfric.curves.curve import Curve
 from contfric.curves.ranges import PlaneRanges
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import Itinerary
+from contfric.models.definition import Model
 
 #: Cells along each side: a cell is finer than a line in a printed figure.
 CELLS = 400

@@ -11,11 +11,11 @@ from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
 from contfric.atlas.plane_state import PlaneExploration
 from contfric.atlas.seeds import Seeds
-from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.curves.ranges import PlaneRanges
 from contfric.errors import ContfricError, ParameterError, mapping_of, real_number, shown
+from contfric.events.bifurcation import EndReason
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 

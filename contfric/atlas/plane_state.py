@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from contfric.atlas.diagram import Diagram
-from contfric.continuation.events import Kind
+from contfric.base.arrays import FloatArray
 from contfric.curves.curve import Curve
+from contfric.curves.half_curve import CurveSide
 from contfric.curves.problem import Problem
 from contfric.curves.ranges import PlaneRanges
-from contfric.curves.side import CurveSide
 from contfric.curves.special import SpecialPoint
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Kind
 
 Progress = Callable[[str], None]
 

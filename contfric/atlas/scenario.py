@@ -12,7 +12,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from contfric.continuation.events import TERMINAL, Bifurcation
+from contfric.events.bifurcation import TERMINAL, Bifurcation
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram, Node

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError, shown, whole_number
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.starts import signs_at
+from contfric.simulation.starts import signs_at
 
 #: Periods after which a seed that has not converged is given up: there are many seeds, and attractors that
 #: take longer are nearly marginal.

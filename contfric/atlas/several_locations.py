@@ -22,12 +22,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import equations_at
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import equations_at
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import SHORT, time_unit
 
-#: Singular values below this share of the largest belong to freedoms, as in :mod:`contfric.orbit.linear`.
+#: Singular values below this share of the largest belong to freedoms, as in :mod:`contfric.bvp.linear`.
 _NULL = 1e-7
 #: Components of a freedom below this share of the largest are rounding of a singular direction: its root.
 _OWN = 1e-3

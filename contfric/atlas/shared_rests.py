@@ -3,7 +3,7 @@
 A hold begins where the solutions of the inclusion are not unique. Where two orbits of the same parameters
 have a hold that begins at the same phase and in the same state, a solution may go on from there with either
 of them each time: every sequence of the two is an orbit. Of k orbits of one period each there are as many of
-n periods as there are aperiodic necklaces, nearly k^n / n (:mod:`contfric.continuation.sequences`), some of
+n periods as there are aperiodic necklaces, nearly k^n / n (:mod:`contfric.events.sequences`), some of
 which may be symmetry images of each other. They belong to one diagram where events join them; what bounds its
 size is ``max_periods`` alone.
 
@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.atlas.matching import guesses
+from contfric.base.arrays import FloatArray
 from contfric.continuation.branch import Branch
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import modulo
 from contfric.orbit.solve import refine

@@ -24,19 +24,19 @@ from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for, where
 from contfric.atlas.matching import same_event, same_kind, same_location
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
-from contfric.continuation.candidates import Candidate
-from contfric.continuation.doubling_point import solved_at_vertex
-from contfric.continuation.events import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
-from contfric.continuation.kinds import kind_of_margin
+from contfric.continuation.half_branch import Side, first_point
+from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.report import bifurcation_at
-from contfric.continuation.side import Side, first_point
 from contfric.continuation.switching import LEAVE, null_vector, settings_value
 from contfric.continuation.vertices import symmetric_part, symmetrised, undoubled, undoubled_part
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
+from contfric.events.candidates import Candidate
+from contfric.events.doubling_point import solved_at_vertex
+from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
 
 #: Where the bend of a branch is told from, and at which share of that it must be the same: up to this share

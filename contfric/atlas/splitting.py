@@ -1,6 +1,6 @@
 """What follows where the touch that pins a hold splits: the same itinerary, pinned to the earlier touch.
 
-See :mod:`contfric.continuation.split_touch`. The equations are singular there in the time of the pin, so that
+See :mod:`contfric.events.split_touch`. The equations are singular there in the time of the pin, so that
 the orbits of the other side are looked for next to the event.
 """
 
@@ -10,9 +10,9 @@ from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.departures import ends_at
 from contfric.atlas.exploration import Exploration
-from contfric.continuation.events import Decision, Kind
 from contfric.continuation.points import next_to
-from contfric.continuation.split_touch import pinned_first, splits
+from contfric.events.bifurcation import Decision, Kind
+from contfric.events.split_touch import pinned_first, splits
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine

@@ -26,9 +26,9 @@ from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_locatio
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import ACCURACY, Bifurcation, EndReason
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
+from contfric.events.bifurcation import ACCURACY, Bifurcation, EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 

@@ -9,7 +9,7 @@ from contextvars import ContextVar
 import numpy as np
 from numpy.typing import NDArray
 
-#: Added to by the kernels, in the order of the fields of :class:`contfric.orbit.counts.Counts`.
+#: Added to by the kernels, in the order of the fields of :class:`contfric.base.counts.Counts`.
 _ALL = np.zeros(4, dtype=np.int64)
 _HERE: ContextVar[NDArray[np.int64]] = ContextVar("contfric_tally", default=_ALL)
 

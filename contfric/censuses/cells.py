@@ -21,9 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.censuses.grid import Grid
-from contfric.models.definition import FloatArray
-from contfric.orbit.system import IntArray
 
 #: Times at which itineraries may differ without harm, beyond the longest orbit (periods).
 _SLACK = 0.05

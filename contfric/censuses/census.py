@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.conditions import ClosedItinerary, Fate, fates_before
 from contfric.censuses.grid import CensusLimits, Grid
@@ -24,8 +25,8 @@ from contfric.censuses.search import Progress, Search, searched
 from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.orbit.itineraries import whole_of
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show

@@ -13,6 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.system import mirror_mode
 from contfric.censuses.itineraries import is_stop, letters_of, modes_after
 from contfric.censuses.sections import (
     Section,
@@ -22,11 +24,10 @@ from contfric.censuses.sections import (
     period_of,
     sweep_from,
 )
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.itineraries import mirror_pairs
-from contfric.orbit.simulation import SimulationEnd
-from contfric.orbit.system import IntArray, mirror_mode
 from contfric.signature import ReducedItinerary
+from contfric.simulation.simulate import SimulationEnd
 
 #: Starts that are simulated at once: rows of events for more would not stay in the processor's cache.
 _AT_ONCE = 4096

@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.system import build_system
 from contfric.censuses.asked import Findings, Mesh, Wanted
 from contfric.censuses.cells import (
     Cells,
@@ -35,11 +37,9 @@ from contfric.censuses.cells import (
 )
 from contfric.censuses.grid import Grid
 from contfric.censuses.orbits import Catalogue
-from contfric.models.definition import FloatArray
 from contfric.orbit.itineraries import whole_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
-from contfric.orbit.system import IntArray, build_system
 from contfric.remember.journal import remembered
 from contfric.signature import ReducedItinerary
 

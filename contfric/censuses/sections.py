@@ -20,14 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.tally import tally
+from contfric.bvp.system import exit_domains, mirror_mode
 from contfric.censuses.conditions import Arcs
 from contfric.censuses.itineraries import letters_of, modes_after
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import IntArray, exit_domains, mirror_mode
-from contfric.orbit.tables import tables
+from contfric.models.definition import Model
 from contfric.remember.journal import remembered
 from contfric.signature.reduced import ReducedPair
+from contfric.simulation.tables import tables
 
 #: Phases at which it is asked whether an exit can be met: an arc narrower than this part of a period
 #: may be missed.

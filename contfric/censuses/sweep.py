@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.compiled import (
     allocating_helper,
     blocks,
@@ -31,11 +32,7 @@ from contfric.compiled import (
     vector,
 )
 from contfric.flow.layouts import FlowType
-from contfric.models.definition import FloatArray
-from contfric.orbit.sides import mode_after, sign_code
-from contfric.orbit.simulation import EventRows
-from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import (
+from contfric.simulation.march import (
     CARRIED,
     STARTED,
     StateWorkspace,
@@ -43,6 +40,8 @@ from contfric.orbit.trajectory import (
     copy_state,
     follow,
 )
+from contfric.simulation.sides import mode_after, sign_code
+from contfric.simulation.simulate import EventRows
 
 #: Most surfaces that a trajectory meets for each of its events: one that is only touched is no event.
 _MOST_MET = 64
@@ -201,9 +200,9 @@ def sweep(  # type: ignore[no-untyped-def]
         onto the section in place
     periods : time to follow, in periods of the excitation
     joints, cycles, clocks, states : events of each trajectory, shapes (K, E, 2), (K, E), (K, E) and
-        (K, E, n), as in :class:`contfric.orbit.simulation.EventRows`
+        (K, E, n), as in :class:`contfric.simulation.simulate.EventRows`
     outcome : number of events (-1: no start), mode after the last one and how the simulation ended
-        (as in :mod:`contfric.orbit.trajectory`) of each, shape (K, 3)
+        (as in :mod:`contfric.simulation.march`) of each, shape (K, 3)
     """
     count, n = starts.shape
     surfaces = tables.observables.shape[0]

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.krawczyk import approximate_inverse
 from contfric.models.balls.numbers import Vector, around, column
-from contfric.models.definition import FloatArray
 
 #: Upper bounds are rounded to floats and multiplied by this.
 _UP = 1.0 + 1e-12

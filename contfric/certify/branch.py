@@ -25,8 +25,8 @@ from contfric.certify.piece import Piece
 from contfric.certify.tracing import Tracer
 from contfric.certify.verdict import Finding, Verdict
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import TERMINAL, EndReason
 from contfric.errors import ParameterError
+from contfric.events.bifurcation import TERMINAL, EndReason
 from contfric.models.balls.numbers import working
 
 #: Bits: rounding of 1e-24 is nothing to boxes that are 1e-7 long.

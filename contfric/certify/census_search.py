@@ -8,15 +8,16 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from flint import arb
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import build_system
 from contfric.certify.census_result import CensusCertificate, ProvedOrbit, Strip
 from contfric.certify.following import Follower, Returned
 from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine_with_symmetry
-from contfric.orbit.system import build_system
 
 _BITS = 100
 #: Intervals of a period at first; sets of narrower ones than a share of the period may be split; undecided

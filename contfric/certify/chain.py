@@ -23,11 +23,11 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
+from contfric.bvp.holds import holds_of
+from contfric.bvp.system import System
 from contfric.certify.kept import Kept, keep_residual, keep_rows
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, zeros
-from contfric.orbit.holds import holds_of
-from contfric.orbit.system import System
 
 
 @dataclass(frozen=True)

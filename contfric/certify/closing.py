@@ -15,14 +15,14 @@ from __future__ import annotations
 
 from flint import arb, arb_mat
 
+from contfric.bvp.system import Layout, System, build_system
 from contfric.certify.chain import Segments
 from contfric.certify.zeros import Closing
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import numbers, zeros
+from contfric.models.mode_domains import mirror_mode
 from contfric.orbit.itineraries import whole_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.structure import mirror_mode
-from contfric.orbit.system import Layout, System, build_system
 
 
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:

@@ -29,7 +29,7 @@ from contfric.certify.limit import LATE, latest
 from contfric.certify.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation
+from contfric.events.bifurcation import Bifurcation
 from contfric.models.balls.build import ball_model
 
 _INTERRUPTED = "interrupted"

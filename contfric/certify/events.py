@@ -15,6 +15,7 @@ from typing import Any
 from flint import arb, arb_mat
 
 from contfric.base.shown import Shown
+from contfric.bvp.margins import EventFunction, Margin
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
 from contfric.certify.extended import (
@@ -33,13 +34,12 @@ from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse,
 from contfric.certify.limit import LATE, TimeOverError, check_time
 from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.touching import rest_at
 from contfric.errors import ParameterError
+from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.touching import rest_at
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, around, column, row_norm, working
-from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 
 #: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.

@@ -28,12 +28,12 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.krawczyk import Equations
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 #: Returns the model at a value of the free parameter.

@@ -12,8 +12,8 @@ from flint import acb, arb
 from contfric.base.files import replacing
 from contfric.certify.diagram_certificate import LEFT_OUT
 from contfric.certify.verdict import Verdict
-from contfric.continuation.events import Kind
 from contfric.errors import ParameterError, ResultFileError, path_of
+from contfric.events.bifurcation import Kind
 from contfric.models.balls.numbers import working
 from contfric.verify.file import CHECKED_MODELS, CHECKS, FORMAT, Answer, check_text
 

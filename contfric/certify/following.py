@@ -28,13 +28,13 @@ from functools import cached_property
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.affine import AffineMatrix
 from contfric.certify.first_times import FirstTimes, first_times
 from contfric.certify.sign import Path, positive
 from contfric.certify.stretch import HALF, LineInS, UndecidedError, ended, released, with_zero
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import column
-from contfric.models.definition import FloatArray
 
 Itinerary = tuple[tuple[str, str], ...]
 #: Entries of the extended state: displacement and velocity.

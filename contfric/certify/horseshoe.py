@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.certify.returns import Release, ReturnMap
 from contfric.certify.stretch import LineInS, UndecidedError
 from contfric.models.balls.numbers import working
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import IntArray
+from contfric.models.definition import Model
 
 _BITS = 100
 #: Ends of W that are tried, and how far images must lie beyond them, in shares of the period.

@@ -1,6 +1,6 @@
 """The inequalities of an orbit over the whole of every segment.
 
-They are those of :mod:`contfric.orbit.system`. Inside of a segment the surfaces that bound its mode are
+They are those of :mod:`contfric.bvp.system`. Inside of a segment the surfaces that bound its mode are
 not met, so that its end is the *first* meeting with the exit surface; there the observables are in the
 domain that the next mode follows. A hold is left with an acceleration that is not negative, and on the
 way no limit of rest is passed.
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from flint import arb, arb_mat
 
+from contfric.bvp.system import System
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import EventCondition
 from contfric.certify.sign import Path, positive, touched, undecided
@@ -29,7 +30,6 @@ from contfric.certify.zeros import (
 )
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
-from contfric.orbit.system import System
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING
 
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
-from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
     from contfric.certify.chain import Segments

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from flint import arb
 
+from contfric.bvp.system import System
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import is_off
 from contfric.certify.extended import Builder, EventCondition, rows_of
@@ -39,7 +40,6 @@ from contfric.certify.turns import Turns
 from contfric.certify.verdict import Verdict, all_of
 from contfric.certify.zeros import Closing
 from contfric.models.balls.numbers import Vector
-from contfric.orbit.system import System
 
 if TYPE_CHECKING:
     from contfric.certify.tracing import Arcs, Tracer

@@ -12,18 +12,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.holds import Hold, Itinerary
+from contfric.bvp.margins import EventFunction, Margin
+from contfric.bvp.system import build_system
 from contfric.certify.extended import EventCondition
-from contfric.continuation.events import Bifurcation, Kind
 from contfric.errors import ContfricError
+from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import column
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.holds import Hold, Itinerary
+from contfric.models.definition import Model
 from contfric.orbit.itineraries import half_of
-from contfric.orbit.margins import EventFunction, Margin
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
-from contfric.orbit.system import build_system
 from contfric.signature.holds import hold_at, is_hold
 
 #: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.

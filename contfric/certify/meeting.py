@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from flint import arb, arb_mat
 
+from contfric.bvp.system import System
 from contfric.certify.chain import Chain, Segments, segments_of
 from contfric.certify.closing import closing_of
 from contfric.certify.events import EventCertificate
@@ -24,7 +25,6 @@ from contfric.certify.zeros import at_start, closed, in_span, zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, column, numbers
-from contfric.orbit.system import System
 
 #: A joint of the branch is taken for that of the event within this distance.
 _NEAR = 1e-5

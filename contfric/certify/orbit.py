@@ -34,7 +34,7 @@ from contfric.certify.zeros import zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slack import margin_rounding
+from contfric.orbit.tolerances import margin_rounding
 
 #: Bits tried one after the other: 128 leave 1e-30 of a state of size 1.
 _BITS = (128, 256, 512)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.inequalities import InequalityName
 from contfric.certify.verdict import Finding
-from contfric.models.definition import FloatArray
 
 #: For a number of events that is not known.
 UNKNOWN = 2

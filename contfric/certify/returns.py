@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import System, build_system
 from contfric.certify.affine import AffineMatrix
 from contfric.certify.chain import Chain, segments_of
 from contfric.certify.closing import closing_of, keeps
@@ -23,9 +25,8 @@ from contfric.certify.stretch import LineInS, UndecidedError, ended, released
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, numbers
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.simulation import run
-from contfric.orbit.system import System, build_system
+from contfric.models.definition import Model
+from contfric.simulation.simulate import run
 
 #: A return has at most this many segments, and lasts at most this many periods.
 _EVENTS, _PERIODS = 60, 50.0

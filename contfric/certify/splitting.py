@@ -34,6 +34,7 @@ from math import comb
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.bounds import regular_along, supersolution, upper
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder, with_multiplier
@@ -41,7 +42,6 @@ from contfric.certify.krawczyk import approximate_inverse, enclosed
 from contfric.certify.passing import dot, null_vectors
 from contfric.certify.verdict import Verdict
 from contfric.models.balls.numbers import Vector, around, column, numbers
-from contfric.models.definition import FloatArray
 
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
 _LEAST = 2.0**-60

@@ -16,6 +16,7 @@ from functools import cache
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Segments, segments_of
 from contfric.certify.closing import closing_of, is_symmetry
@@ -25,11 +26,10 @@ from contfric.certify.kept import with_kept
 from contfric.certify.meeting import as_zero_of
 from contfric.certify.zeros import in_span
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import TERMINAL
+from contfric.events.bifurcation import TERMINAL
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 #: Shortest step that is halved, as a share of the branch; events at its ends are as near to them and nearer.

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from flint import arb, arb_mat
 
+from contfric.bvp.system import System
 from contfric.certify.certificate import Certificate
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.circle import has_no_pair
@@ -24,7 +25,6 @@ from contfric.certify.turns import turns_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.branch import Branch
 from contfric.models.balls.numbers import Vector
-from contfric.orbit.system import System
 
 #: Halvings of a step of the branch: what is not proved then is left.
 HALVINGS = 12

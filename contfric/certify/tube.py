@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from flint import arb, arb_mat
 
+from contfric.base.arrays import FloatArray
 from contfric.certify.bounds import Bounds, regular_along, supersolution
 from contfric.certify.chain import Chain, Segments
 from contfric.certify.extended import Builder
@@ -33,7 +34,6 @@ from contfric.certify.krawczyk import approximate_inverse, krawczyk
 from contfric.certify.ray import Chord, Linear, Ray
 from contfric.certify.verdict import Verdict
 from contfric.models.balls.numbers import Vector, around, column, numbers
-from contfric.models.definition import FloatArray
 
 #: How far a box reaches beyond its two orbits, as a share of it: boxes of a tube overlap.
 OVERLAP = 0.02

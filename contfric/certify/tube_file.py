@@ -19,7 +19,7 @@ from flint import ctx
 from contfric.certify.files import unknowns_of
 from contfric.certify.inequalities import DURATION, INSIDE, JOINT
 from contfric.certify.piece import Piece
-from contfric.continuation.events import TERMINAL, EndReason
+from contfric.events.bifurcation import TERMINAL, EndReason
 from contfric.models.balls.numbers import working
 from contfric.verify.curve import Link, check_admissible
 from contfric.verify.file import BITS, CHECKED_MODELS, FORMAT, check_text, events_between, orbits_at

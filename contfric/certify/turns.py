@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from flint import arb, arb_mat
 
+from contfric.bvp.system import System
 from contfric.certify.chain import Segments, segments_of
 from contfric.certify.events import EventCertificate
-from contfric.continuation.events import Kind
+from contfric.events.bifurcation import Kind
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import Vector, column, numbers
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import System
 
 #: A joint of the branch is taken for that of the event within this distance.
 _NEAR = 1e-5

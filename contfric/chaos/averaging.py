@@ -19,9 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.compiled import allocating_helper, helper
-from contfric.models.definition import FloatArray
-from contfric.orbit.system import IntArray
 
 #: Most batches; half as many are there after each merging. Even.
 BATCHES = 32

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.averaging import clear, gather
 from contfric.chaos.cycle import forget, returned
 from contfric.chaos.endings import NO_MOTION, averaged, starts_at_rest, write_nothing
@@ -36,11 +37,9 @@ from contfric.compiled import (
 from contfric.compiling.references import by_reference, reference_at, store_at
 from contfric.flow.layouts import FlowType, TogetherType
 from contfric.flow.without import SINGLY
-from contfric.models.definition import FloatArray
-from contfric.orbit.sides import surfaces_after
-from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import HOLD_PERIODS, TablesType
-from contfric.orbit.walls import walls_of
+from contfric.simulation.march import HOLD_PERIODS, TablesType
+from contfric.simulation.sides import surfaces_after
+from contfric.simulation.walls import walls_of
 
 StartingType = types.NamedTuple(
     [indices, indices, indices, indices, indices, table, indices, indices, vector, f8], Starting

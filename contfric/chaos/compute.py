@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.base.memory import must_fit
 from contfric.chaos.exponents import checked_time, limits_of
 from contfric.chaos.map import LyapunovMap, points_of
@@ -19,11 +20,11 @@ from contfric.chaos.tiles import Tile, TileRows, compute_tile, empty_tile, insid
 from contfric.chaos.work import Work, put_rows
 from contfric.errors import ParameterError, function_of, shown, whole_number
 from contfric.models import ModelSource
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.excitation import check_excitation
-from contfric.orbit.time_scale import has_clock
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.remember.folder import kept_in
+from contfric.simulation.excitation import check_excitation
+from contfric.simulation.time_scale import has_clock
 
 #: Bytes of a solution in a map beyond its exponents and its initial state.
 _BYTES = 24

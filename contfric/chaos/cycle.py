@@ -21,6 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.cyclic import dense_solve
+from contfric.bvp.spectrum import spectrum
 from contfric.chaos.tangent import (
     ARRIVED,
     Transit,
@@ -34,11 +37,7 @@ from contfric.chaos.tangent import (
     to_joint,
 )
 from contfric.compiled import allocating_helper, helper, inlined_helper
-from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import dense_solve
-from contfric.orbit.sides import surfaces_after
-from contfric.orbit.spectrum import spectrum
-from contfric.orbit.system import IntArray
+from contfric.simulation.sides import surfaces_after
 
 #: Joints that are remembered.
 _MEMORIES = 3

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
+from contfric.bvp.cyclic import dense_solve
+from contfric.bvp.spectrum import spectrum
 from contfric.chaos.averaging import close_periods, grows, mean_rate, sign_of
 from contfric.chaos.tangent import is_autonomous
 from contfric.compiled import helper
-from contfric.orbit.cyclic import dense_solve
-from contfric.orbit.spectrum import spectrum
-from contfric.orbit.trajectory import HELD, IMPOSSIBLE, INFINITE, TOO_LARGE
+from contfric.simulation.march import HELD, IMPOSSIBLE, INFINITE, TOO_LARGE
 
 #: The solutions, by their numbers in :class:`contfric.chaos.status.Motion`; 8 and 9 are given elsewhere.
 PERIODIC, TRANSIENT, CHAOTIC, SETTLING, UNDECIDED, AT_REST, UNBOUNDED, NO_MOTION = range(8)

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.starts import StateLike, default_states, given_states
 from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.excitation import check_excitation
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
+from contfric.simulation.excitation import check_excitation
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_xarray
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.exponents import lyapunov_dimension
 from contfric.chaos.status import Motion
 from contfric.chaos.tiles import TileRows
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -26,7 +26,7 @@ from contfric.chaos.tangent import (
     to_joint,
 )
 from contfric.compiled import helper
-from contfric.orbit.trajectory import QUIET
+from contfric.simulation.march import QUIET
 
 #: A separation that grew by this factor has grown from rounding to the size of the motion: the motion
 #: forgot where it started, which one that only converges never does.

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.structure import cut_bounds
-from contfric.orbit.system import IntArray
-from contfric.orbit.tables import tables
-from contfric.orbit.time_scale import clock_period, ticks_of, time_scale
+from contfric.models.definition import Model
+from contfric.models.mode_domains import cut_bounds
+from contfric.simulation.tables import tables
+from contfric.simulation.time_scale import clock_period, ticks_of, time_scale
 
 
 class Starting(NamedTuple):
@@ -32,7 +32,7 @@ class Starting(NamedTuple):
     settled : side of surfaces that a state is always on one side of, 0 of others, shape (surfaces,)
     cuts : whether motion is cut at a surface in all modes, shape (surfaces,)
     widths, unit : what the sizes of states and the unit of time are told by, as in
-        :mod:`contfric.orbit.entered`, at the default parameters; shape (n,), and a number
+        :mod:`contfric.simulation.entered_domain`, at the default parameters; shape (n,), and a number
     """
 
     mode: IntArray

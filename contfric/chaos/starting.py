@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from contfric.compiled import helper
-from contfric.orbit.ahead import side_ahead, size_of
+from contfric.simulation.leaving_side import side_ahead, size_of
 
 #: A state lies on a surface within this share of what its observable is summed up from, as in
-#: :mod:`contfric.orbit.entered`.
+#: :mod:`contfric.simulation.entered_domain`.
 _ON = 16.0 * 2.0**-52
 
 
@@ -71,8 +71,8 @@ def is_entered(functions, tables, starting, d, on, standing, t, y, p, unit, work
 def entered_mode(functions, tables, starting, code, on, standing, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Return the mode that the solution goes into from surfaces; -1 if none is found.
 
-    The same as :func:`contfric.orbit.entered.entered_domain`: first what the sides say, then the domains
-    next to the state, those first that lie on most surfaces.
+    The same as :func:`contfric.simulation.entered_domain.entered_domain`: first what the sides say, then the
+    domains next to the state, those first that lie on most surfaces.
     """
     period = functions.period(p, workspace.none, workspace.empty)
     unit = period if period > 0.0 else starting.unit
@@ -137,7 +137,7 @@ def mode_of_signs(functions, tables, starting, code, t, y, p, workspace):  # typ
 def start_mode(functions, tables, starting, t, y, p, workspace):  # type: ignore[no-untyped-def]
     """Return (mode, surfaces that it leaves as bits) of an initial state; (-1, 0) if it is in no domain.
 
-    As where a simulation starts (:func:`contfric.orbit.starts.start_of`): on surfaces, to rounding, what
+    As where a simulation starts (:func:`contfric.simulation.starts.start_of`): on surfaces, to rounding, what
     the solution goes into, else what the signs say as they are.
     """
     exact = start_code(functions, tables.observables, t, y, p, workspace)

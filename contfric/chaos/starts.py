@@ -8,10 +8,11 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, shown, whole_number
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.starts import displaced, with_clocks, within_a_turn
-from contfric.orbit.time_scale import has_clock
+from contfric.models.definition import Model
+from contfric.simulation.starts import displaced, with_clocks, within_a_turn
+from contfric.simulation.time_scale import has_clock
 
 #: A state, shape (n,), several, shape (k, n), or a function of the parameters that returns either.
 StateLike: TypeAlias = ArrayLike | Callable[[Mapping[str, float]], ArrayLike]

@@ -33,14 +33,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.compiled import allocating_helper, helper
 from contfric.flow.without import SINGLY
-from contfric.models.definition import FloatArray
-from contfric.orbit.resting import still_bounced
-from contfric.orbit.sides import mode_after
-from contfric.orbit.system import IntArray
-from contfric.orbit.together import mode_together
-from contfric.orbit.trajectory import (
+from contfric.simulation.coming_to_rest import still_bounced
+from contfric.simulation.march import (
     CHATTER,
     HELD,
     HOLD_PERIODS,
@@ -56,7 +53,9 @@ from contfric.orbit.trajectory import (
     sides_after,
     whole_turns,
 )
-from contfric.orbit.walls import (
+from contfric.simulation.met_together import mode_together
+from contfric.simulation.sides import mode_after
+from contfric.simulation.walls import (
     MOST_AT_ONCE,
     NO_FLIGHT,
     NO_TIME,

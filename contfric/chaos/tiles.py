@@ -9,12 +9,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.rows import FollowingLimits, follow
 from contfric.chaos.starts import default_states
 from contfric.chaos.status import Motion
 from contfric.chaos.work import TileTask
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import IntArray
+from contfric.models.definition import Model
 
 #: Rows and columns of a rectangle.
 Place: TypeAlias = tuple[slice, slice]

@@ -6,14 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.chaos.averaging import Averages, new_averages
 from contfric.chaos.cycle import CycleWorkspace, Memory, new_cycle_workspace, new_memory
 from contfric.chaos.tangent import EVENTS, Transit, new_transit, state_workspace
 from contfric.compiled import allocating_helper, helper, inlined_helper
 from contfric.compiling.references import by_reference, words_of
 from contfric.flow.without import SINGLY
-from contfric.models.definition import FloatArray
-from contfric.orbit.trajectory import StateWorkspace
+from contfric.simulation.march import StateWorkspace
 
 
 class CellWorkspaces(NamedTuple):

@@ -161,7 +161,7 @@ def _draw_graph(model: Model, path: Path) -> None:
 def simulate(options: argparse.Namespace) -> int:
     """``contfric simulate``: mode that ended and surface met at each event."""
     from contfric.models import load_model
-    from contfric.orbit import simulation
+    from contfric.simulation import simulate as simulation
 
     model = load_model(options.model)
     params = _parameters(options.params, options.model)

@@ -18,24 +18,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered, cached_property
-from contfric.continuation.doubling_point import opening
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
-from contfric.continuation.gradients import (
+from contfric.bvp.system import EventFunction, Margin
+from contfric.continuation.moved_by_errors import UNITS, fold_error, moved_by_errors
+from contfric.continuation.points import Point, Settings
+from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.doubling_point import opening
+from contfric.events.gradients import (
     before_reset,
     carried,
     closing,
     gradient_of,
     surface_gradient,
 )
-from contfric.continuation.moved_by_errors import UNITS, fold_error, moved_by_errors
-from contfric.continuation.points import Point, Settings
-from contfric.continuation.zero_acceleration import joint_within, stationary_values
-from contfric.models.definition import FloatArray
+from contfric.events.zero_acceleration import joint_within, stationary_values
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import EventFunction, Margin
 
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
 #: the rounding of one, and no diagram resolves it.

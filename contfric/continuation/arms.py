@@ -22,15 +22,15 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import assembled, null_vectors
+from contfric.bvp.system import System
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings
-from contfric.continuation.side import first_point
-from contfric.continuation.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.errors import NotationError
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled, null_vectors
+from contfric.events.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import System
 
 #: A singular value this small (relative to the largest) is zero at a fold: the length of a hold is known
 #: there to the root of rounding.

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, Kind
+from contfric.continuation.half_branch import Side
 from contfric.continuation.openings import with_openings
 from contfric.continuation.passed_families import with_families
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import Side
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, Kind
 from contfric.orbit.orbit import Orbit
 
 #: Share of the range above which a branch is wider than any event's accuracy that makes sense: those need not

@@ -11,20 +11,21 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
-from contfric.continuation.events import Bifurcation, End
+from contfric.bvp.linear import of_two_halves
+from contfric.bvp.system import System, build_system
 from contfric.continuation.nodes import Nodes, between, nodes_of
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import Bifurcation, End
+from contfric.models.definition import Model
 from contfric.orbit.itineraries import mirror_pairs, mirrored_labels
-from contfric.orbit.linear import of_two_halves
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.reading import read_signature
+from contfric.orbit.read_signature import read_signature
 from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
-from contfric.orbit.system import IntArray, System, build_system
 
 if TYPE_CHECKING:
     import pandas as pd

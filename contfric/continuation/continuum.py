@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import equations_at, null_space
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import equations_at, null_space
 from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:

@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import equations_at
+from contfric.bvp.system import System
 from contfric.continuation.points import Point, Settings
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.system import System
 
 #: Smallest singular value of J against the largest, above which no branch point is near. Near one it is
 #: about the distance; steps of a branch are 1e-2 at most.

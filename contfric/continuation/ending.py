@@ -7,18 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.continuation.holdable import NoJump
-from contfric.continuation.limits import limit_end
-from contfric.continuation.locations import locations_of
-from contfric.continuation.outcomes import outcome_at
+from contfric.base.arrays import FloatArray
+from contfric.continuation.half_branch import Side
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import Side
-from contfric.continuation.touching import entered_at, is_crossed, thrown_at
+from contfric.continuation.range_ends import limit_end
 from contfric.continuation.vertex_ends import CROSSED
 from contfric.continuation.vertices import at_vertex
 from contfric.errors import NotationError
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason, Kind
+from contfric.events.holdable import NoJump
+from contfric.events.locations import locations_of
+from contfric.events.outcomes import outcome_at
+from contfric.events.touching import entered_at, is_crossed, thrown_at
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
 from contfric.orbit.sections import is_smooth

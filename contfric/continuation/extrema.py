@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import tangent_of
 from contfric.continuation.hermite import along, point_between, zero_between
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import tangent_of
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import NumberWithGradient, differentiated
 from contfric.quantities.registry import Quantity, QuantityLike, number_quantity

@@ -6,18 +6,18 @@ import numpy as np
 
 from contfric.base.attributes import altered
 from contfric.continuation.crossing import crossing_between
-from contfric.continuation.doubling_point import opens_through
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.continuation.half_branch import point_before
+from contfric.continuation.located_event import ROUGH, bifurcation_at
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.report import ROUGH, bifurcation_at
-from contfric.continuation.side import point_before
-from contfric.continuation.split_touch import as_split
 from contfric.continuation.vertices import (
     parabola_vertex,
     simpler_fold,
     symmetric_part,
     undoubled_part,
 )
+from contfric.events.bifurcation import Bifurcation, Kind
+from contfric.events.doubling_point import opens_through
+from contfric.events.split_touch import as_split
 from contfric.orbit.orbit import Orbit
 
 #: A parameter that changes this slowly along a branch, in units of arclength, is constant: the orbits are

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import first_point
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.motion import Directions
 
@@ -23,7 +23,7 @@ def cubic_between(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return joints, parameters, tangent and direction at a share of a step, by the cubic through both ends.
 
-    It is Hermite's, as in :func:`contfric.continuation.geometry.interpolate`.
+    It is Hermite's, as in :func:`contfric.continuation.core.geometry.interpolate`.
     """
     y, length = 1.0 - x, b.arc - a.arc
     ha, hb = y * y * (1.0 + 2.0 * x), x * x * (3.0 - 2.0 * x)

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.tally import tally
+from contfric.bvp.system import System
+from contfric.continuation.half_branch import branch_problem
 from contfric.continuation.points import Point, PointRows, Settings
-from contfric.continuation.side import branch_problem
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import System
 
 if TYPE_CHECKING:
-    from contfric.continuation.bracket import Sought
-    from contfric.continuation.geometry import Points
+    from contfric.continuation.core.geometry import Points
+    from contfric.continuation.core.locate import Sought
 
 
 #: Cosine of an angle by which no tangent turns over a step: three times the most that is accepted.
@@ -75,7 +75,7 @@ def locate_label(
     the same locations are tried. A change at the first point itself, such as an event at which a branch
     starts, is found without a trial, which says nothing of those after it.
     """
-    from contfric.continuation.bracket import BY_LABEL
+    from contfric.continuation.core.locate import BY_LABEL
 
     found = []
     for one, other in ((before, after), (after, before)):
@@ -97,7 +97,7 @@ def _located(
     target: float,
 ) -> tuple[Point | None, bool]:
     """Return the location of one change of sign, and whether a label changes at one location only."""
-    from contfric.continuation.bracket import BY_TEST, locate
+    from contfric.continuation.core.locate import BY_TEST, locate
 
     rows = _TRIALS.between(orbit.system, before, after, settings.scale)
     problem, sought = branch_problem(orbit, settings), sought_of(kind, index, target)
@@ -117,7 +117,7 @@ def sought_of(
     kind: int, index: int = 0, target: float = 0.0, planes: FloatArray = _NO_PLANES
 ) -> Sought:
     """Return a value whose change of sign is sought, as the compiled bracket takes it."""
-    from contfric.continuation.bracket import Sought
+    from contfric.continuation.core.locate import Sought
 
     plain = np.zeros(1, dtype=np.int64)
     return Sought(kind, index, target, np.ascontiguousarray(planes, dtype=np.float64), plain)
@@ -127,7 +127,7 @@ def locate_value(
     orbit: Orbit, before: Point, after: Point, settings: Settings, target: float
 ) -> Point:
     """Return the point at which the parameter takes a value."""
-    from contfric.continuation.bracket import BY_PARAMETER
+    from contfric.continuation.core.locate import BY_PARAMETER
 
     if before.value == target:
         return before

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import held_back
+from contfric.bvp.linear import linearised, null_space, stacked
 from contfric.continuation.points import Point
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import linearised, null_space, stacked
 from contfric.orbit.orbit import Orbit
 
 #: Units of rounding in one equation of a segment: its phases, its duration and its state have some each.

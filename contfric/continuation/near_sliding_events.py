@@ -12,18 +12,18 @@ parameter's distance to the event: its slope vanishes at the event with d itself
 what is rounding.
 
 What is so near to a sliding event that the parameter does not tell it from that belongs to it
-(:func:`contfric.continuation.resolve.belongs_to`). So nothing is lost if signs are taken where that begins:
-there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 1e-6 for c of order 1.
+(:func:`contfric.continuation.events_of_step.belongs_to`). So nothing is lost if signs are taken where that
+begins: there d is the root of a part in 1e9 of the range, and ``e / (c d)^2`` is below 1e-6 for c of order 1.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
+from contfric.continuation.half_branch import first_point, point_before
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.continuation.side import first_point, point_before
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential

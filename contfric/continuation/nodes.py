@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Kind
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.events.bifurcation import Kind
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.system import IntArray
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch

@@ -15,10 +15,10 @@ import numpy as np
 
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
-from contfric.continuation.doubling_point import location_error, opening, refined_opening
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings
-from contfric.continuation.side import first_point
+from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.doubling_point import location_error, opening, refined_opening
 from contfric.orbit.index import opening_sign, opening_signs
 from contfric.orbit.orbit import Orbit
 

@@ -14,17 +14,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Margin
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.moved_by_errors import UNITS
 from contfric.continuation.openings import in_order
 from contfric.continuation.points import Settings
 from contfric.continuation.vertical import family_near
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import Margin
 
 #: A multiplier of a symmetric branch that comes this near to -1 and leaves again is asked for a family.
 _TOUCHES = 1e-2

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.attributes import altered
+from contfric.bvp.system import System
 from contfric.errors import (
     ParameterError,
     checked_range,
@@ -19,16 +21,15 @@ from contfric.errors import (
     truth,
     whole_number,
 )
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.excitation import check_excitation
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import is_smooth
-from contfric.orbit.system import IntArray, System
 from contfric.quantities.registry import number_quantity
+from contfric.simulation.excitation import check_excitation
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
-    from contfric.continuation.geometry import Points
+    from contfric.continuation.core.geometry import Points
     from contfric.quantities.registry import QuantityLike
 
 #: Largest step of models that declare none, where the range of the parameter counts 1 (and grows with the
@@ -223,7 +224,7 @@ class PointRows:
 
     def arrays(self, stop: int | None = None) -> Points:
         """Return the arrays up to a row, as the march takes them."""
-        from contfric.continuation.geometry import Points
+        from contfric.continuation.core.geometry import Points
 
         return Points(*[array[:stop] for array in vars(self).values()])
 

@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import ACCURACY, Bifurcation, Kind
+from contfric.bvp.system import EventFunction, Margin, inside_sign
+from contfric.continuation.half_branch import point_before
 from contfric.continuation.holds_forward import nearer_than_twins, with_holds_forward
-from contfric.continuation.kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.continuation.locate_change import locate_change
+from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.report import bifurcation_at
-from contfric.continuation.side import point_before
-from contfric.continuation.standing_slides import goes_nowhere
-from contfric.continuation.touching import is_rate_of
+from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.sliding_kinds import bends_outward, hold_of_test, kind_of_margin
+from contfric.events.standing_slides import goes_nowhere
+from contfric.events.touching import is_rate_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction, Margin, inside_sign
 from contfric.signature.holds import ends_rest, is_hold
 
 #: Margins below this at a located event vanish with it: they form a group. Located margins are
@@ -120,7 +120,7 @@ def _first_located(
     What comes first ends the branch; what vanishes with it is of its group. They are asked in the order of
     their secants: one that is still positive where another vanishes vanishes behind it, and is not located.
     """
-    from contfric.continuation.bracket import BY_TEST
+    from contfric.continuation.core.locate import BY_TEST
 
     ends = zip(before.tests.tolist(), after.tests[: len(orbit.system.tests)].tolist(), strict=False)
     share = {}  # of the step, to where the secant of a violated margin vanishes
@@ -274,7 +274,7 @@ def _located_before(
     and so is the tangent that trials are predicted with: they may end on another curve. A location at which
     more of a margin is left than the event misses it by is such a jump, and no zero.
     """
-    from contfric.continuation.bracket import BY_TEST
+    from contfric.continuation.core.locate import BY_TEST
 
     tests = point.tests[: len(orbit.system.tests)].tolist()
     violated = (k for k, value in enumerate(tests) if value < -_TOGETHER)

@@ -7,9 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.base.attributes import altered
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.continuum import LEVEL
-from contfric.continuation.doubling_point import opens_through
-from contfric.continuation.events import Bifurcation, Kind
 from contfric.continuation.folds import (
     NEAR_ONE,
     SHORTEST_OVERSHOOT,
@@ -19,7 +18,9 @@ from contfric.continuation.folds import (
     fold_between,
     not_located,
 )
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.locate_change import locate_change, locate_label
+from contfric.continuation.located_event import ROUGH, bifurcation_at
 from contfric.continuation.near_sliding_events import (
     NO_LENGTH,
     SAME_FOLD,
@@ -29,11 +30,10 @@ from contfric.continuation.near_sliding_events import (
     last_told,
 )
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.continuation.report import ROUGH, bifurcation_at
-from contfric.continuation.side import first_point
 from contfric.continuation.vertices import parabola_vertex, symmetric_part, undoubled_part
+from contfric.events.bifurcation import Bifurcation, Kind
+from contfric.events.doubling_point import opens_through
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction, Margin
 
 #: The same for a tangency: near a tangential release (AS) the load overshoots its limit by the square
 #: of the release's rate, which is rounding up to this distance.
@@ -55,8 +55,8 @@ def smooth_events(
     orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
 ) -> list[Located]:
     """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good after them."""
-    from contfric.continuation.bracket import BY_TEST
-    from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
+    from contfric.continuation.core.locate import BY_TEST
+    from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
     base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
     size = min(1.0, orbit.model.size_of(active, before.value))
@@ -168,7 +168,7 @@ def _at_multiplier(
     orbit: Orbit, column: int, before: Point, beyond: Point, point: Point, settings: Settings
 ) -> list[Located]:
     """Return what a multiplier on the unit circle is: a branch point, a doubling, a torus, or nothing."""
-    from contfric.continuation.steps import CHI_MINUS, CHI_PAIR
+    from contfric.continuation.core.steps import CHI_MINUS, CHI_PAIR
 
     kind, value = Kind.BP, -1.0 if column == CHI_MINUS else 1.0
     if column != CHI_PAIR and np.all(np.abs(point.mu - value) > NEAR_ONE):
@@ -267,7 +267,7 @@ def _undone(
     One touch may go from segment to segment: what it changes in one of them is undone soon. So labels are
     asked on both sides of the changes that are known, first by the tangent, which is near enough there.
     """
-    from contfric.continuation.bracket import BY_PARAMETER
+    from contfric.continuation.core.locate import BY_PARAMETER
 
     active = orbit.model.index_of(settings.parameter)
     found: list[Located] = []

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.continuation.events import End, EndReason
+from contfric.continuation.half_branch import Side
 from contfric.continuation.hermite import along, point_between, zero_between
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import Side
+from contfric.events.bifurcation import End, EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions

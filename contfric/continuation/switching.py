@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
+from contfric.bvp.linear import assembled
 from contfric.continuation.crossing import Direction
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import EXTRA, Point, Settings, displaced
-from contfric.continuation.side import first_point
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foreseeable
 
@@ -107,7 +107,7 @@ def overshoots(
     between, or the branch is no parabola there. Multipliers, and the parameter, may change so fast near a
     touch of a kink.
     """
-    from contfric.continuation.steps import CHI_MINUS
+    from contfric.continuation.core.steps import CHI_MINUS
 
     nearer = leave_along(orbit, settings, along, _AT_ONCE * distance)
     if nearer is None:

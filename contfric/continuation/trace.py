@@ -19,19 +19,19 @@ import numpy as np
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.ending import endless, grows, never_leaves, only_lengthens, slows_down
-from contfric.continuation.events import ACCURACY, TERMINAL, Bifurcation, End, EndReason
-from contfric.continuation.limits import is_at_limit, limit_end
+from contfric.continuation.events_of_step import end_of_holds, resolve
+from contfric.continuation.half_branch import Side, first_point
+from contfric.continuation.located_event import ROUGH
+from contfric.continuation.moving_joints import move_joints
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
-from contfric.continuation.report import ROUGH
-from contfric.continuation.resolve import end_of_holds, resolve
-from contfric.continuation.section_joints import move_joints
-from contfric.continuation.side import Side, first_point
+from contfric.continuation.range_ends import is_at_limit, limit_end
 from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.start import start_of, too_fast
 from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
 from contfric.continuation.vertical import VerticalFamily, family_near
 from contfric.errors import ConvergenceError, function_of
+from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable
 from contfric.remember.journal import remembered
@@ -231,7 +231,7 @@ def _forget_unresolved(side: Side, settings: Settings) -> None:
 
 def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
-    from contfric.continuation import march as kernels
+    from contfric.continuation.core import march as kernels
 
     if side.count >= settings.most_points:
         side.end = End(EndReason.POINTS)

@@ -15,12 +15,10 @@ from enum import Enum, auto
 import numpy as np
 
 from contfric.continuation.crossing import crossing_near
-from contfric.continuation.doubling_point import moved, opening
-from contfric.continuation.events import Bifurcation, End, EndReason, Kind
 from contfric.continuation.folds import overshot_vertex, vertex_at
+from contfric.continuation.half_branch import Side, first_point, point_before
+from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.report import bifurcation_at
-from contfric.continuation.side import Side, first_point, point_before
 from contfric.continuation.smooth import tangencies
 from contfric.continuation.vertices import (
     at_vertex,
@@ -29,6 +27,8 @@ from contfric.continuation.vertices import (
     symmetrised,
     undoubled,
 )
+from contfric.events.bifurcation import Bifurcation, End, EndReason, Kind
+from contfric.events.doubling_point import moved, opening
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
 from contfric.orbit.sections import is_smooth

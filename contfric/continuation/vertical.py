@@ -26,14 +26,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import equations_at, null_space
 from contfric.continuation.accuracy import LEAST
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import continua_of
-from contfric.continuation.events import TERMINAL, Bifurcation, End
+from contfric.continuation.located_event import ROUGH
 from contfric.continuation.points import Settings
-from contfric.continuation.report import ROUGH
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import equations_at, null_space
+from contfric.events.bifurcation import TERMINAL, Bifurcation, End
 from contfric.orbit.orbit import Orbit
 
 #: Smallest singular value of the equations (joints alone), relative to the largest, next to a family.

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
-from contfric.continuation.doubling_point import EVEN, NEARLY, solved_at_vertex
+from contfric.bvp.linear import null_vectors
+from contfric.bvp.system import System, build_system
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.side import first_point
-from contfric.models.definition import FloatArray
+from contfric.events.doubling_point import EVEN, NEARLY, solved_at_vertex
 from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of
-from contfric.orbit.linear import null_vectors
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.section_crossings import crossings_near
 from contfric.orbit.sections import in_halves, is_smooth
-from contfric.orbit.system import System, build_system
 
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import Kind
-from contfric.continuation.kinds import kind_of_margin
+from contfric.base.arrays import FloatArray
 from contfric.continuation.points import Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Kind
+from contfric.events.sliding_kinds import kind_of_margin
 
 if TYPE_CHECKING:
-    from contfric.curves.side import CurveSide
+    from contfric.curves.half_curve import CurveSide
 
 
 def join_sides(behind: CurveSide | None, ahead: CurveSide, first: CurveEnd | None = None) -> Curve:

@@ -1,14 +1,15 @@
 """Second derivatives of one segment in a direction, compiled: of its end, its exit row, an observable.
 
 For a direction (tau, xi, delta) of (t_i, y_i, duration) they are the change of the exact first
-derivatives. A flow may give that of its own (:mod:`contfric.flow.second`); else they are central differences.
+derivatives. A flow may give that of its own (:mod:`contfric.flow.oscillator.second`); else they are central
+differences.
 
 *After a reset* a segment is ``phi(t_i, R(t_i, y_i), d)``, and its derivatives follow by the chain rule.
 Central differences of those contain the second derivatives of R.
 
 *Divided exit rows.* The exit row of a short segment that begins on its exit surface is the mean of the
 rate, ``q = int_0^1 r'(s d) ds = r(d) / d`` with r the distance to the surface
-(:mod:`contfric.orbit.short_exits`). It is a function of ``(t_i, y_i, d)`` as the flow is, and of no later
+(:mod:`contfric.bvp.short_exits`). It is a function of ``(t_i, y_i, d)`` as the flow is, and of no later
 state; D_v of its gradient takes the place of the observable's. Of the quotient itself, where r = 0,
 
     D_v D_w (r / d) = D_v D_w r / d - (D_v r D_w d + D_w r D_v d) / d^2:
@@ -18,10 +19,10 @@ the cross terms do not vanish, and at d = 0 all of it is a quotient of zeros. Of
 
 from __future__ import annotations
 
+from contfric.bvp.after_reset import apply_reset
+from contfric.bvp.equations import segment_jacobian
+from contfric.bvp.short_exits import mean_rate_row
 from contfric.compiled import helper
-from contfric.orbit.after_reset import apply_reset
-from contfric.orbit.equations import segment_jacobian
-from contfric.orbit.short_exits import mean_rate_row
 
 #: Step of the differences where a flow has no second derivatives of its own, against the size of the
 #: direction: the cube root of rounding.

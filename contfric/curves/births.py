@@ -12,16 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.events import Kind
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import EventFunction
 from contfric.continuation.points import Point
 from contfric.continuation.vertices import passed_vertex, symmetrised, undoubled
 from contfric.curves.locating import CurveStep
 from contfric.curves.meeting import with_multiplier
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Kind
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction
 
 #: Orbits are nearly symmetric within this: a bracket of what is singular ends some 1e-5 away.
 _NEARLY = 1e-3

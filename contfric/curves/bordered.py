@@ -32,10 +32,10 @@ import math
 
 import numpy as np
 
+from contfric.bvp.short_exits import is_divided
 from contfric.compiled import helper
 from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
 from contfric.curves.chain import chain_solve, fill_blocks, set_border
-from contfric.orbit.short_exits import is_divided
 
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.

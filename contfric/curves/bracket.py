@@ -1,6 +1,6 @@
 """Location of a change between two points of a curve, compiled.
 
-The bracket is that of :mod:`contfric.continuation.bracketing`; every trial is watched as any point.
+The bracket is that of :mod:`contfric.continuation.core.bracket`; every trial is watched as any point.
 """
 
 from __future__ import annotations
@@ -9,10 +9,10 @@ import numpy as np
 from numba import types
 
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel
-from contfric.continuation.bracket import BY_LABEL, BY_TEST, SoughtType
-from contfric.continuation.bracketing import Rules, bracketing
-from contfric.continuation.geometry import PointsType
-from contfric.continuation.steps import AT_EVENT, EXTRA
+from contfric.continuation.core.bracket import Rules, bracketing
+from contfric.continuation.core.geometry import PointsType
+from contfric.continuation.core.locate import BY_LABEL, BY_TEST, SoughtType
+from contfric.continuation.core.steps import AT_EVENT, EXTRA
 from contfric.curves.correct import CurveProblemType, along_curve, correct_curve, observe_curve
 
 #: Share of a step to which a location is bracketed.

@@ -6,10 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.compiled import allocating_helper, helper
-from contfric.curves.bending import DIFFERENCE
-from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import (
+from contfric.base.arrays import FloatArray
+from contfric.bvp.cyclic import (
     Elimination,
     elimination_workspace,
     finish,
@@ -17,7 +15,9 @@ from contfric.orbit.cyclic import (
     start_border,
     take_out,
 )
-from contfric.orbit.equations import segment_rows
+from contfric.bvp.equations import segment_rows
+from contfric.compiled import allocating_helper, helper
+from contfric.curves.bending import DIFFERENCE
 
 
 class BorderedWorkspace(NamedTuple):

@@ -24,22 +24,21 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bordered import spectral_value, spread_end
-from contfric.curves.chain import BorderedWorkspace, bordered_workspace
-from contfric.models.definition import FloatArray
-from contfric.orbit.after_reset import apply_reset
-from contfric.orbit.cyclic import Elimination, elimination_workspace
-from contfric.orbit.equations import EquationWorkspace, equation_workspace, segment_jacobian
-from contfric.orbit.followed import Followed, followed_values
-from contfric.orbit.spectrum import SpectralWorkspace, spectral_workspace
-from contfric.orbit.stationary import (
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.after_reset import apply_reset
+from contfric.bvp.cyclic import Elimination, elimination_workspace
+from contfric.bvp.equations import EquationWorkspace, equation_workspace, segment_jacobian
+from contfric.bvp.spectrum import SpectralWorkspace, spectral_workspace
+from contfric.bvp.stationary_points import (
     StationaryPoints,
     find_after_reset,
     find_stationary,
     stationary_workspace,
 )
-from contfric.orbit.system import IntArray
+from contfric.bvp.stationary_values import Followed, followed_values
+from contfric.compiled import allocating_helper, f8, helper, i8, indices
+from contfric.curves.bordered import spectral_value, spread_end
+from contfric.curves.chain import BorderedWorkspace, bordered_workspace
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL, QUANTITY = range(6)
 

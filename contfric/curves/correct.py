@@ -1,7 +1,7 @@
 """One point of a curve, compiled: the corrector normal to the tangent, the watch, the border vectors.
 
-As :mod:`contfric.continuation.steps` for a branch; the border rows after the first are the gradients of the
-conditions. Along a curve on which a quantity is held changes of stability and labels are no events.
+As :mod:`contfric.continuation.core.steps` for a branch; the border rows after the first are the gradients of
+the conditions. Along a curve on which a quantity is held changes of stability and labels are no events.
 """
 
 from __future__ import annotations
@@ -12,8 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.equations import LayoutType
+from contfric.bvp.monitor import watch
+from contfric.bvp.newton import CHECKS, MULTIPLIERS, off_normal
+from contfric.bvp.spectrum import multipliers
+from contfric.bvp.stationary_points import find_after_reset, find_stationary
+from contfric.bvp.stationary_values import remember
 from contfric.compiled import allocating_helper, helper, indices, vector
-from contfric.continuation.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, correcting_along
+from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, correcting_along
 from contfric.curves.bending import DIFFERENCE
 from contfric.curves.conditions import (
     EXIT,
@@ -30,14 +37,6 @@ from contfric.curves.held_conditions import Conditions, ConditionsType, fill_con
 from contfric.curves.lagrangian import LagrangianWorkspace, lagrangian_workspace
 from contfric.curves.normal_form import cubic_coefficient
 from contfric.flow.layouts import FlowType, SecondType
-from contfric.models.definition import FloatArray
-from contfric.orbit.equations import LayoutType
-from contfric.orbit.followed import remember
-from contfric.orbit.monitor import watch
-from contfric.orbit.newton import CHECKS, MULTIPLIERS, off_normal
-from contfric.orbit.spectrum import multipliers
-from contfric.orbit.stationary import find_after_reset, find_stationary
-from contfric.orbit.system import IntArray
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the
 #: coefficient of the normal form, or the rate of the load at a stop.

@@ -12,15 +12,16 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
-from contfric.continuation.events import Kind, meaning_of
+from contfric.bvp.system import EventFunction, System
 from contfric.curves.special import CurveEnd, SpecialPoint
 from contfric.errors import either
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import Kind, meaning_of
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction, IntArray, System
 
 if TYPE_CHECKING:
     import pandas as pd

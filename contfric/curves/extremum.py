@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.continuation.extrema import Extremum
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
@@ -38,7 +39,6 @@ from contfric.errors import (
     shown,
     whole_number,
 )
-from contfric.models.definition import FloatArray
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical

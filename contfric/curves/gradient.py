@@ -17,11 +17,11 @@ import math
 import numpy as np
 
 from contfric.base.named import Named
-from contfric.continuation.events import Bifurcation
 from contfric.curves.points import first_curve_point
 from contfric.curves.problem import Problem, problem_of
 from contfric.curves.ranges import PlaneRanges
 from contfric.errors import ConvergenceError, ParameterError
+from contfric.events.bifurcation import Bifurcation
 from contfric.orbit.gradient import Gradient
 
 #: A share of the tangent below which a parameter stands still along the curve: rounding of solved points.

@@ -14,8 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.equations import LayoutType, close_chain
+from contfric.bvp.system import Layout
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
-from contfric.continuation.geometry import copy_to, copy_vector
+from contfric.continuation.core.geometry import copy_to, copy_vector
 from contfric.curves.lagrangian import (
     add_bend,
     differentiated_extreme,
@@ -23,10 +26,7 @@ from contfric.curves.lagrangian import (
     quantity_row,
 )
 from contfric.handle import HandleType
-from contfric.models.definition import FloatArray
-from contfric.orbit.equations import LayoutType, close_chain
 from contfric.orbit.peak import Extreme, ExtremeType
-from contfric.orbit.system import Layout
 
 #: What the conditions are: an extremum that has a value, one that is stationary in all free parameters but
 #: the last, a function that is called.

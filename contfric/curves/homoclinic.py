@@ -13,12 +13,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import EndReason
 from contfric.continuation.points import MOST_POINTS
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_trace import continue_quantity
 from contfric.curves.trace import Progress
 from contfric.errors import ParameterError, real_number
+from contfric.events.bifurcation import EndReason
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -23,11 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.equations import close_chain, segment_rows
 from contfric.compiled import allocating_helper, helper
 from contfric.curves.bending import DIFFERENCE
 from contfric.curves.chain import chain_solve, fill_blocks, set_border
-from contfric.models.definition import FloatArray
-from contfric.orbit.equations import close_chain, segment_rows
 from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_location
 
 

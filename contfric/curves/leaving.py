@@ -26,23 +26,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.continuation.candidates import edited_orbit
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind
-from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.outcomes import outcome_at
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import Point
 from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.curves.after_event import Start, itineraries_at, prove, starts_of
 from contfric.curves.births import simpler_problem
 from contfric.curves.curve import CurvePart
-from contfric.curves.going_on import Start, itineraries_at, prove, starts_of
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem, border_of, problem_of
 from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
+from contfric.events.candidates import edited_orbit
+from contfric.events.outcomes import outcome_at
+from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction, Margin
 
 #: Distances near a degenerate point at which the curve that leaves is started: as for branches.
 _BESIDE = (1e-2, 3e-3, 1e-3)

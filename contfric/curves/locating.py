@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.base.tally import tally
 from contfric.continuation.hermite import cubic_between
 from contfric.continuation.locate_change import sought_of
 from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import Conditioned, compiled_problem, solve_point
-from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
-    from contfric.continuation.bracket import Sought
+    from contfric.continuation.core.locate import Sought
 
 #: Share of a step to which a location is bracketed: the resolution of the arithmetic.
 _RESOLUTION = 4e-16
@@ -126,20 +126,20 @@ class CurveStep(Generic[P]):
 
 def by_test(index: int) -> Sought:
     """Return the search for the zero of one test."""
-    from contfric.continuation.bracket import BY_TEST
+    from contfric.continuation.core.locate import BY_TEST
 
     return sought_of(BY_TEST, index)
 
 
 def by_label(row: int, before: int) -> Sought:
     """Return the search for the change of one label."""
-    from contfric.continuation.bracket import BY_LABEL
+    from contfric.continuation.core.locate import BY_LABEL
 
     return sought_of(BY_LABEL, row, float(before))
 
 
 def by_location(planes: FloatArray) -> Sought:
     """Return the search for where the least of ``a p + b q + c`` vanishes."""
-    from contfric.continuation.bracket import BY_PARAMETER
+    from contfric.continuation.core.locate import BY_PARAMETER
 
     return sought_of(BY_PARAMETER, planes=planes)

@@ -1,8 +1,8 @@
 """Pseudo-arclength continuation of conditions in q free parameters, compiled.
 
-The march is that of :mod:`contfric.continuation.march`. The unknowns are the joints and the free parameters;
-the border rows after the first are the q - 1 conditions: a bifurcation in two parameters, or what is asked of
-a quantity.
+The march is that of :mod:`contfric.continuation.core.march`. The unknowns are the joints and the free
+parameters; the border rows after the first are the q - 1 conditions: a bifurcation in two parameters, or
+what is asked of a quantity.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
+from contfric.bvp.stationary_values import count_followed
 from contfric.compiled import blocks, f8, i8, kernel
-from contfric.continuation.geometry import CourseType
-from contfric.continuation.march import marching
+from contfric.continuation.core.geometry import CourseType
+from contfric.continuation.core.march import marching
 from contfric.curves.correct import (
     CurveProblemType,
     accept_curve,
@@ -20,7 +21,6 @@ from contfric.curves.correct import (
     correct_curve,
     observe_curve,
 )
-from contfric.orbit.followed import count_followed
 
 _march_points = marching(correct_curve, observe_curve, accept_curve)
 
@@ -32,7 +32,7 @@ def march_curve(problem, border, course):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     border : the vectors b and c, shape (2, N, m); they follow the null vectors
-    course : as that of :func:`contfric.continuation.march.march`
+    course : as that of :func:`contfric.continuation.core.march.march`
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Where SN, BP or PD meets a tangential exit: both conditions are solved at once.
 
 The rate of such an exit vanishes. Where a stick follows, nothing that comes later depends on when it is
-reached, and the multipliers have a limit (:mod:`contfric.orbit.saltation`). But the chain's Jacobian has the
+reached, and the multipliers have a limit (:mod:`contfric.bvp.saltation`). But the chain's Jacobian has the
 time of that joint as a null vector, all along the curve of the exit: the bordered function vanishes on both
 curves, and its gradient where they cross. Newton's method on the curve of the multiplier is singular there,
 and a bracket gets no closer than the root of rounding. The curve of the exit is regular: on it the product of
@@ -15,12 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.base.interrupts import whole
+from contfric.bvp.passages import Passage, passage_at
+from contfric.bvp.system import EventFunction, Margin, following_modes
 from contfric.continuation.points import Point
 from contfric.curves.points import first_curve_point, solve_point
 from contfric.curves.problem import Problem
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.passages import Passage, passage_at
-from contfric.orbit.system import EventFunction, Margin, following_modes
 
 #: A rate at an exit below this vanishes with the margin that a bracket has found: that ends some 1e-5 away.
 _TANGENTIAL = 1e-3

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.continuation.events import Kind
-from contfric.continuation.kinds import kind_of_margin
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import EXTRA, Point
 from contfric.curves.births import end_of_asymmetry
 from contfric.curves.locating import CurveStep, by_label, by_test
 from contfric.curves.meeting import at_once
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
-from contfric.orbit.system import EventFunction, Margin
+from contfric.events.bifurcation import Kind
+from contfric.events.sliding_kinds import kind_of_margin
 
 #: A multiplier this far from the real axis belongs to a complex pair.
 _COMPLEX = 1e-6

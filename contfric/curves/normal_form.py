@@ -23,11 +23,11 @@ extrapolation; everything is local to a segment.
 
 from __future__ import annotations
 
+from contfric.bvp.short_exits import is_divided
 from contfric.compiled import helper
 from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
 from contfric.curves.bordered import _THIRD, end_of, segment_direction
 from contfric.curves.chain import chain_solve, set_border
-from contfric.orbit.short_exits import is_divided
 
 
 @helper

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.pace import Pace
 from contfric.base.tally import tally
+from contfric.bvp.linear import assembled
+from contfric.bvp.system import System
 from contfric.continuation.points import SMALLEST_STEP, Point, PointRows
 from contfric.curves.problem import Problem, border_of
 from contfric.curves.ranges import Ranges
 from contfric.curves.special import CurveEndReason
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import assembled
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.pace import Pace
-from contfric.orbit.system import IntArray, System
 
 if TYPE_CHECKING:
     from contfric.curves.conditions import Condition
@@ -82,9 +82,9 @@ def march_rows(
     largest: float,
 ) -> tuple[int, int, float]:
     """March on from row k by calls between which Ctrl-C is heard; (why it stopped, last row, next step)."""
-    from contfric.continuation.geometry import Course
-    from contfric.continuation.march import BUDGET, MORE
-    from contfric.continuation.steps import AT_EVENT
+    from contfric.continuation.core.geometry import Course
+    from contfric.continuation.core.march import BUDGET, MORE
+    from contfric.continuation.core.steps import AT_EVENT
     from contfric.curves.march import march_curve
 
     compiled, box, counts = compiled_problem(problem), problem.box, tally()
@@ -135,7 +135,7 @@ def march_on(
 
 def end_of_march(why: int) -> CurveEndReason | None:
     """Return why a curve ends where its march stops; None where it goes on."""
-    from contfric.continuation import march as codes
+    from contfric.continuation.core import march as codes
 
     ends = {
         codes.STEP: CurveEndReason.STEP,
@@ -196,7 +196,7 @@ def solve_point(
     border: FloatArray,
 ) -> Point | None:
     """Solve for one point normal to a direction; ``border`` is made to follow it. None if Newton fails."""
-    from contfric.continuation.march import BROKEN
+    from contfric.continuation.core.march import BROKEN
 
     rows = PointRows.empty(problem.system, 1, len(w))
     rows.joints[0], rows.w[0] = joints, w

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.continuation.events import TERMINAL, Bifurcation, Kind
-from contfric.continuation.kinds import kind_of_margin
-from contfric.continuation.touching import rest_at
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.linear import jacobian_blocks, stacked
+from contfric.bvp.system import EventFunction, Margin, System
 from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.linear import jacobian_blocks, stacked
+from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
+from contfric.events.sliding_kinds import kind_of_margin
+from contfric.events.touching import rest_at
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
-from contfric.orbit.system import EventFunction, IntArray, Margin, System
 
 if TYPE_CHECKING:
     from contfric.curves.conditions import Condition

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.tabled import Columns, Tabled
+from contfric.bvp.system import System
 from contfric.curves.special import CurveEnd
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import System
 from contfric.quantities.measure import of_orbits
 from contfric.quantities.registry import quantity_of
 

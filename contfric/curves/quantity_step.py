@@ -2,9 +2,9 @@ r"""Conditions on quantities of orbits, for the compiled march: what vanishes al
 
 The unknowns are the joints z and q parameters w, of which q - 1 conditions leave a curve. An extremum over
 the orbit is differentiated in compiled code (:mod:`contfric.curves.lagrangian`). Any other quantity is a
-function of Python that the march calls. In the scaled product of :mod:`contfric.continuation.geometry` z and
-w are one vector x. The null space of F' has q directions T, from a QR factorisation of the transpose; with
-the shortest step :math:`\delta_0` to the orbits, :math:`F'\delta_0 = -F`, the row
+function of Python that the march calls. In the scaled product of :mod:`contfric.continuation.core.geometry`
+z and w are one vector x. The null space of F' has q directions T, from a QR factorisation of the transpose;
+with the shortest step :math:`\delta_0` to the orbits, :math:`F'\delta_0 = -F`, the row
 
 .. math:: r = C'T\,T^T + \frac{C'\delta_0\,\delta_0^T}{\delta_0^T\delta_0}
 
@@ -24,16 +24,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.interrupts import held_back
+from contfric.bvp.linear import equations_at
+from contfric.bvp.system import System
 from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import solve_point
 from contfric.curves.ranges import Ranges, limits_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.errors import ConvergenceError
-from contfric.models.definition import FloatArray
-from contfric.orbit.linear import equations_at
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray, System
 from contfric.quantities.extreme import in_rows, peak_of
 from contfric.quantities.measure import differentiated
 from contfric.quantities.motion import Directions

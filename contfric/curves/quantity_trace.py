@@ -11,8 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contfric.continuation.events import EndReason
-from contfric.continuation.kinds import kind_of_margin
+from contfric.base.arrays import FloatArray
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
 from contfric.curves.locating import CurveStep
@@ -29,7 +28,8 @@ from contfric.errors import (
     real_number,
     whole_number,
 )
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import EndReason
+from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated

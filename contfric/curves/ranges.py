@@ -8,8 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, checked_range, did_you_mean, items_of, mapping_of, shown
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 #: A start on the edge of a range lies within it: it may be off by rounding, as a share of the width.
 _SLACK = 1e-9

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.base.shown import Shown
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.bvp.system import EventFunction
+from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import EventFunction
 
 
 class CodimTwo(str, Enum):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.base.arrays import FloatArray
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.curve import Curve, CurvePart
 from contfric.curves.locating import CurveStep
@@ -31,7 +31,7 @@ from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import Progress
 from contfric.errors import ConvergenceError, ParameterError
-from contfric.models.definition import FloatArray
+from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 
 #: A multiplier this far from the unit circle does not belong to a located NS.

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.base.arrays import FloatArray
 from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point
+from contfric.curves.after_event import Start, goes_on, is_continuum, prove
 from contfric.curves.assembly import join_sides
 from contfric.curves.births import birth_among
 from contfric.curves.curve import Curve
-from contfric.curves.going_on import Start, goes_on, is_continuum, prove
+from contfric.curves.half_curve import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
 from contfric.curves.points import end_of_march, first_curve_point, march_on, returned
 from contfric.curves.problem import Problem, check_start, problem_of
 from contfric.curves.ranges import box_of
-from contfric.curves.side import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.errors import (
     ConvergenceError,
@@ -26,7 +26,8 @@ from contfric.errors import (
     real_number,
     whole_number,
 )
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import Bifurcation, Kind
+from contfric.models.definition import Model
 from contfric.remember.journal import remembered
 
 #: A first point farther than this from the bifurcation (in widths of the ranges) is another one.
@@ -253,7 +254,7 @@ def _trace_piece(
 
 def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[bool, float]:
     """March once and deal with what stopped it; (whether the side is finished, next step)."""
-    from contfric.continuation.march import EVENT, OUTSIDE
+    from contfric.continuation.core.march import EVENT, OUTSIDE
 
     if len(side.points) >= most:
         side.end = CurveEnd(CurveEndReason.POINTS)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, check_executor
@@ -29,8 +30,8 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.quantities.registry import QuantityLike, number_quantity
 from contfric.remember.folder import kept_in
 

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, mapping_of, shown
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 _VALID = "(low, high), or a frozen distribution of scipy.stats (in a study {norm: [0.4, 0.005]})"
 

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_pandas, need_xarray
 from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.ensembles.rows import Drawn, Rows, by_sample
 from contfric.ensembles.statistics import SobolIndices, share_of, sobol_indices
 from contfric.errors import ParameterError, did_you_mean, shown
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.quantities.registry import QuantityLike
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.response.basins import wilson
 
 #: Resamples for the intervals of Sobol indices: their ends are the 10th of each side, good to a third of the

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.work import TileTask
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import EndReason
 from contfric.ensembles.rows import Drawn, Rows
 from contfric.errors import ContfricError, ConvergenceError, ParameterError
-from contfric.models.definition import FloatArray, Model
+from contfric.events.bifurcation import EndReason
+from contfric.models.definition import Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray
 from contfric.quantities.measure import of_branch, of_orbit
 from contfric.quantities.registry import Quantity, QuantityLike, quantity_of
 from contfric.remember.advance import cores_are_busy

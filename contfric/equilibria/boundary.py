@@ -24,9 +24,9 @@ from enum import Enum
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.equilibria.regions import ModeRegion, regions_of
 from contfric.equilibria.zero_curve import Arc, CurvePoint
-from contfric.models.definition import FloatArray
 
 #: A field vanishes: relative to what its rates are at a natural distance.
 _VANISHES = 1e-7

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
@@ -16,7 +17,7 @@ from contfric.equilibria.find import equilibrium_at
 from contfric.equilibria.regions import ModeRegion
 from contfric.equilibria.result import Equilibrium
 from contfric.errors import ParameterError, did_you_mean
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.equilibria.events import BoundaryPoint, EquilibriumEvent, HopfPoint
 from contfric.equilibria.regions import regions_of, scale_of
 from contfric.errors import ContfricError, ConvergenceError, real_number
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit, Status
 
 if TYPE_CHECKING:
@@ -115,8 +115,8 @@ def _solved(event: HopfPoint, amplitude: float) -> Orbit | None:
 
 def _ellipse(event: HopfPoint, amplitude: float) -> Orbit | None:
     """Return the cycle of the normal form, unsolved; None at parameters that the model does not have."""
+    from contfric.bvp.system import build_system
     from contfric.orbit.clock import clocked
-    from contfric.orbit.system import build_system
 
     at, centre = event.equilibrium, event.centre
     model, active = at.model, at.model.index_of(event.parameter)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.base.tabled import stacked
 from contfric.equilibria.branch import EquilibriumBranch
@@ -19,8 +20,8 @@ from contfric.equilibria.result import Equilibrium, EquilibriumSet
 from contfric.equilibria.trace import continue_equilibrium
 from contfric.errors import checked_range, function_of, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.equilibria.newton import Zeros
 from contfric.equilibria.regions import ModeRegion, check_no_excitation, regions_of, scale_of
@@ -23,8 +24,8 @@ from contfric.equilibria.result import (
 )
 from contfric.errors import whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 
 #: Two zeros nearer than this, in natural sizes of the states, are one.
 _SAME = 1e-7

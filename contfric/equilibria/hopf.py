@@ -26,9 +26,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.equilibria.regions import ModeRegion
 from contfric.equilibria.result import ComplexArray
-from contfric.models.definition import FloatArray
 
 #: Relative: an imaginary part below this is rounding, as that of a double eigenvalue may be: its root.
 _REAL = 1e-7

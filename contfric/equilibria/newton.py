@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.equilibria.regions import ModeRegion
-from contfric.models.definition import FloatArray
 
 #: Newton's method converges within about ten steps, or wanders.
 _STEPS, _HALVINGS = 60, 10

@@ -27,8 +27,9 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.models.definition import Domain, FloatArray, Model
+from contfric.models.definition import Domain, Model
 
 #: On a surface: this near, relative to what the height is made of. Equilibria are solved to about 1e-14 times
 #: their condition; nothing that moves apart is told apart below it.
@@ -163,8 +164,8 @@ def regions_of(model: Model) -> tuple[ModeRegion, ...]:
     import sympy
 
     from contfric.models.describe import from_text
-    from contfric.models.numbers import function_of_numbers
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.numbers import function_of_numbers
 
     if not model.definition:
         raise ParameterError(
@@ -216,7 +217,7 @@ def check_no_excitation(model: Model, params: Mapping[str, float], active: str =
     if model.autonomous or not model.definition:
         return
     from contfric.models.describe import from_text
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
 
     formulas = Formulas(from_text(model.definition))
     known = {
@@ -255,12 +256,12 @@ class Fields:
         """The field g."""
         if not self.on:
             return list(self.field)
-        from contfric.models.symbols import step_off
+        from contfric.models.generated.symbols import step_off
 
         return [f - b for f, b in zip(self.field, step_off(self.on, self.states), strict=True)]
 
     def _function(self, formulas: Any, *more: Sequence[Any]) -> Function:
-        from contfric.models.numbers import function_of_numbers
+        from contfric.models.language.numbers import function_of_numbers
 
         return function_of_numbers([self.states, self.parameters, *more], formulas)
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 if TYPE_CHECKING:
     import pandas as pd

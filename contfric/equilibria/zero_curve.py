@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.equilibria.regions import ModeRegion
-from contfric.models.definition import FloatArray
 
 #: Newton's method in the normal plane: quadratic, from a predictor that is near.
 _STEPS, _SHORT, _CONVERGED = 12, 1e-14, 1e-10

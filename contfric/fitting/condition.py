@@ -13,13 +13,14 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from contfric.continuation.events import Bifurcation
+from contfric.base.arrays import FloatArray
 from contfric.curves.gradient import slope_of
-from contfric.curves.moved import moved_event
+from contfric.curves.moved_event import moved_event
 from contfric.errors import ContfricError
+from contfric.events.bifurcation import Bifurcation
 from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import predicted
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

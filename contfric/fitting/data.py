@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, mapping_of, real_number, shown
-from contfric.models.definition import FloatArray
 
 if TYPE_CHECKING:
-    from contfric.continuation.events import Bifurcation
+    from contfric.events.bifurcation import Bifurcation
     from contfric.quantities.registry import QuantityLike
 
 
@@ -83,7 +83,7 @@ class Jump:
     params: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        from contfric.continuation.events import Bifurcation
+        from contfric.events.bifurcation import Bifurcation
 
         if not isinstance(self.event, Bifurcation):
             raise ParameterError(f"a jump is taken for a Bifurcation, got {shown(self.event)}")

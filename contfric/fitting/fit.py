@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.base.named import Named
 from contfric.chaos.running import Progress, check_executor
@@ -31,7 +32,7 @@ from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import signal_of
 from contfric.fitting.result import INTERRUPTED, Fit
 from contfric.models import ModelSource, load_model
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.inside import Inside
 from contfric.quantities.registry import number_quantity

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ContfricError
 from contfric.fitting.data import Measured, Series
-from contfric.models.definition import FloatArray
-from contfric.models.quantity_texts import Functional, read
+from contfric.models.language.quantity_texts import Functional, read
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.duals import Kinks

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_pandas
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
 from contfric.fitting.condition import Datum
 from contfric.fitting.data import Jump, Series
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.registry import name_of
 

@@ -31,8 +31,8 @@ from typing import NamedTuple
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
+from contfric.flow.integration.variations import FloatArray
 from contfric.flow.layouts import FLOW, SECOND
-from contfric.flow.variations import FloatArray
 from contfric.handle import TABLE, HandleType
 
 #: By modes: the flight between the impacts (-1: no mode of chatter), observable of the gap, surface of the

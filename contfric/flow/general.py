@@ -1,9 +1,9 @@
 """The flow of any model from its functions: three kernels for each kind, compiled once for all models.
 
 A mode moves by its closed form where it is affine (:mod:`contfric.flow.linear`), else by integration
-(:mod:`contfric.flow.kinked`). A mode that slides starts on its surfaces: what is moved is the state put
-onto them, so that derivatives are multiplied by those of that projection. The zeros of what depends on
-time alone are sought along a solution at rest: they need no integration.
+(:mod:`contfric.flow.integration.kinked`). A mode that slides starts on its surfaces: what is moved is the
+state put onto them, so that derivatives are multiplied by those of that projection. The zeros of what
+depends on time alone are sought along a solution at rest: they need no integration.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from contfric.compiled import (
     kernel,
     stationary_signature,
 )
-from contfric.flow.kinked import kinked_flow, kinked_hit, kinked_stationary
+from contfric.flow.integration.kinked import kinked_flow, kinked_hit, kinked_stationary
+from contfric.flow.integration.radau import IMPLICIT_STAGES
+from contfric.flow.integration.stiffness import automatic, automatic_probe
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.flow import linear_flow
 from contfric.flow.linear.method import explicit_or_linear, explicit_or_linear_probe
 from contfric.flow.linear.search import linear_hit
 from contfric.flow.linear.stationary import linear_stationary
-from contfric.flow.radau import IMPLICIT_STAGES
-from contfric.flow.stiffness import automatic, automatic_probe
 from contfric.handle import HandleType, with_handle
 
 

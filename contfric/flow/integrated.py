@@ -37,8 +37,8 @@ from typing import Any
 import numpy as np
 
 from contfric.compiled import Kernel
-from contfric.flow.dop853 import POWER
 from contfric.flow.general import FlowKind, kernels_of, still
+from contfric.flow.integration.dop853 import POWER
 from contfric.flow.interface import CompiledFlow
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.kept import NUMBERS
@@ -60,7 +60,7 @@ TOLERANCE = 1e-12
 
 @dataclass(frozen=True)
 class AffineModes:
-    """The modes that are affine, and their functions (:mod:`contfric.models.linear_code`).
+    """The modes that are affine, and their functions (:mod:`contfric.models.generated.linear_code`).
 
     Attributes
     ----------
@@ -89,7 +89,8 @@ class Functions:
     relative, absolute : error that a step may make relative to a state, and to its scale
     sides : for (mode, observable): the side, 1 or -1, of a level of the observable that segments of the
         mode which start on it leave to; one that leaves to the other side hits at once
-    kinks : the observables that vanish where the field has a kink (:mod:`contfric.flow.kinked`); ``field``
+    kinks : the observables that vanish where the field has a kink (:mod:`contfric.flow.integration.kinked`);
+    ``field``
         and ``rate`` take pieces of modes then
     slides, onto : modes that slide, and ``onto(mode, t, y, p, which, y1, jac)``, which puts a state on their
         surfaces

@@ -63,7 +63,7 @@ FUNCTIONS = {
     # onto(mode, t, y, p, which, y1, jac): the state on the surfaces that a mode slides on
     "onto": field_signature,
 }
-#: The functions of affine modes (:mod:`contfric.models.linear_code`).
+#: The functions of affine modes (:mod:`contfric.models.generated.linear_code`).
 AFFINE = {
     # entries(piece, p, which, co, slopes): the coefficients of a piece, or of
     # an observable, with derivatives by p[which]; frequencies; which of these are heard

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.models.definition import (
     Constraint,
     Departure,
     Domain,
-    FloatArray,
     Mode,
     Model,
     Observable,
@@ -48,7 +48,7 @@ def _slide(load: str, direction: str) -> Domain:
 
 
 def _flow() -> CompiledFlow:
-    from contfric.flow.forced_oscillator import compiled_flow
+    from contfric.flow.oscillator.flow import compiled_flow
 
     return compiled_flow()
 

@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
@@ -41,7 +42,6 @@ from contfric.models.parts import (
     Constraint,
     Departure,
     Domain,
-    FloatArray,
     Mode,
     Observable,
     Parameter,
@@ -61,7 +61,6 @@ __all__ = [
     "Constraint",
     "Departure",
     "Domain",
-    "FloatArray",
     "Mode",
     "Model",
     "Observable",
@@ -97,13 +96,13 @@ class Model(Shown, TransitionMaps):
     resets : tuple of Reset
         Surfaces at which the state is mapped.
     chatters : tuple of Chatter
-        Modes that begin with infinitely many impacts (:mod:`contfric.models.chatter`).
+        Modes that begin with infinitely many impacts (:mod:`contfric.models.shorthand.chatter`).
     autonomous : bool
         Whether there is no excitation: the flow's ``period`` returns 0, the period of an orbit is found
         with it, and ``periods`` of a simulation are units of time.
     kinks : tuple of str
         Observables at whose zeros the fields have kinks and no jumps: no joints, labels or events
-        (:mod:`contfric.flow.kinked`).
+        (:mod:`contfric.flow.integration.kinked`).
     filippov : bool
         Whether rest is left without acceleration everywhere (static and kinetic limit agree): slides may then
         shrink to nothing.
@@ -189,9 +188,9 @@ class Model(Shown, TransitionMaps):
         """Modes that are integrated numerically, and why (of a model that is declared by its equations)."""
         if not self.definition:
             return {}
-        from contfric.models.coded import forms_of
         from contfric.models.describe import from_text
-        from contfric.models.symbols import integrated_modes
+        from contfric.models.generated.formula_tables import forms_of
+        from contfric.models.generated.symbols import integrated_modes
 
         if forms_of(self.definition) is not None:
             return {}

@@ -12,19 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
-from contfric.models.build import GeneratedFlow
-from contfric.models.definition import (
-    Constraint,
-    Departure,
-    Domain,
-    FloatArray,
-    Mode,
-    Model,
-    Surface,
-    Symmetry,
-)
+from contfric.models.definition import Constraint, Departure, Domain, Mode, Model, Surface, Symmetry
 from contfric.models.departing import (
     departing_side,
     leaves_at_rest,
@@ -35,8 +26,9 @@ from contfric.models.departing import (
 from contfric.models.description import Description, Range
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
-from contfric.models.grammar import FLOATS, PERIOD, TIME, Scope, parse
+from contfric.models.generated.build import GeneratedFlow
 from contfric.models.landing import reset_of
+from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Scope, parse
 from contfric.models.measuring import displacement_of, extrema_at_joints
 from contfric.models.regions import domains_of, is_possible, ordered_surfaces
 from contfric.models.sections import clear_surfaces, join_domains, joined_modes
@@ -85,7 +77,7 @@ def model_from(description: Description) -> Model:
         If the description contradicts itself; with the address of the entry.
     """
     if description.structure:
-        from contfric.models.structure_model import composed_from
+        from contfric.models.structures.growing_model import composed_from
 
         return composed_from(description)
     params = defaults(description)

@@ -8,22 +8,22 @@ from functools import lru_cache
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.clocks import TICK
-from contfric.models.contact_laws import ContactLaws, check_laws
-from contfric.models.contact_modes import with_contacts
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.description import Description, DomainText, ModeText
 from contfric.models.entries import EntryError, known_keys, known_sides, one_of
 from contfric.models.evaluate import check_period
+from contfric.models.generated.on_disk import derived
+from contfric.models.language.names import Names
 from contfric.models.measuring import measured
-from contfric.models.names import Names
-from contfric.models.on_disk import derived
 from contfric.models.parts import Chatter
 from contfric.models.quantity_entries import check_quantities
 from contfric.models.ranges import check_ranges, ranges_of, spread_of
 from contfric.models.reset_modes import FROM, TO, acts_of, leads_of
-from contfric.models.shorthand import expanded
-from contfric.models.structure_names import COORDINATES
+from contfric.models.shorthand.clocks import TICK
+from contfric.models.shorthand.written_out import expanded
+from contfric.models.structures.contact_laws import ContactLaws, check_laws
+from contfric.models.structures.contact_modes import with_contacts
+from contfric.models.structures.names import COORDINATES
 
 
 @lru_cache(maxsize=16)

@@ -13,11 +13,11 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
-from contfric.models.contact_laws import KEY as LAWS
-from contfric.models.contact_laws import ContactLaws, written
 from contfric.models.definition import Departure, Observable, Parameter, Surface
-from contfric.models.names import Names
+from contfric.models.language.names import Names
 from contfric.models.parts import Chatter, Lead
+from contfric.models.structures.contact_laws import KEY as LAWS
+from contfric.models.structures.contact_laws import ContactLaws, written
 
 #: The key of the structure that modes are made from.
 STRUCTURE = "structure"
@@ -70,7 +70,7 @@ class Description:
     max_step : largest step of a continuation where the user gives none; None for the engine's
     quantities : (name, expression) of each quantity that the file declares
     laws : what the contacts of a structure carry and dissipate
-    units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.units`)
+    units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.shorthand.units`)
     origins : (state, what it is measured from in all formulas), of a symmetry with a shift
     phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty without one
     structure : what modes are made from when they are visited; empty where all are listed

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from contfric.models.entries import EntryError
-from contfric.models.grammar import FLOATS, PERIOD, TIME, Algebra, parse
-from contfric.models.python_code import Function, function_of
+from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Algebra, parse
+from contfric.models.language.python_code import Function, function_of
 
 if TYPE_CHECKING:
     from contfric.models.description import Description

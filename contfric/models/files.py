@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
 from contfric.models.entries import EntryError, plain
-from contfric.models.matrices import loaded
-from contfric.models.on_disk import derived
+from contfric.models.generated.on_disk import derived
+from contfric.models.structures.matrices import loaded
 
 if TYPE_CHECKING:
     from contfric.base.yaml_lines import Address, LocatedYaml
@@ -99,9 +99,9 @@ def model_of(definition: str) -> Model:
 
 
 def _model_from(definition: str) -> Model:
-    from contfric.models.build import prepare
     from contfric.models.derive import model_from
     from contfric.models.describe import from_text
+    from contfric.models.generated.build import prepare
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place

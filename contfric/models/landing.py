@@ -11,12 +11,12 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from contfric.models.angles import wraps_of
 from contfric.models.definition import Domain, Reset, Surface
 from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
-from contfric.models.grammar import parse
+from contfric.models.language.grammar import parse
 from contfric.models.parts import EITHER, Lead, led
+from contfric.models.shorthand.angles import wraps_of
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24

@@ -23,8 +23,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError
-from contfric.models.contact_laws import KEY as FORCES
-from contfric.models.contacts import Contact, ContactKind
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.measuring import proportional
@@ -32,6 +30,8 @@ from contfric.models.parts import MOST_SURFACES
 from contfric.models.regions import domains_of, engine_order, known_sides
 from contfric.models.reset_modes import named_parts
 from contfric.models.sections import has_kinks, joined_modes
+from contfric.models.structures.contact_laws import KEY as FORCES
+from contfric.models.structures.contacts import Contact, ContactKind
 
 if TYPE_CHECKING:
     from contfric.models.definition import Model

@@ -15,9 +15,16 @@ from collections.abc import Mapping, Sequence
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError
-from contfric.models.grammar import PI, check_name
-from contfric.models.names import Names
-from contfric.models.quantity_texts import BUNDLED, FUNCTIONALS, LIST, WORK, no_contact, read
+from contfric.models.language.grammar import PI, check_name
+from contfric.models.language.names import Names
+from contfric.models.language.quantity_texts import (
+    BUNDLED,
+    FUNCTIONALS,
+    LIST,
+    WORK,
+    no_contact,
+    read,
+)
 
 KEY = "quantities"
 

@@ -8,7 +8,7 @@ from typing import Any
 from contfric.models.description import Description, Range
 from contfric.models.entries import EntryError, known_keys
 from contfric.models.evaluate import defaults, floats
-from contfric.models.names import Names
+from contfric.models.language.names import Names
 
 
 def spread_of(spread: Mapping[str, Any], states: tuple[str, ...]) -> tuple[str, ...]:

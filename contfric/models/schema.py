@@ -44,7 +44,7 @@ from contfric.models.schema_values import (
     numbered,
     said,
 )
-from contfric.models.structure_names import COORDINATES
+from contfric.models.structures.names import COORDINATES
 
 #: Tolerances between rounding and what Newton's method on a chain of segments still takes for smooth.
 _TOLERANCES = (1e-14, 1e-6)

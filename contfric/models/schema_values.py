@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from contfric.base.yaml_lines import as_truth
 from contfric.errors import ModelError
 from contfric.models.entries import AUTO, SIDES
-from contfric.models.grammar import number_of
+from contfric.models.language.grammar import number_of
 
 #: Numbers that a model can be computed with: products of some of them are still finite.
 _LARGEST, _SMALL_UNIT, _LARGE_UNIT = 1e300, 1e-100, 1e100

@@ -20,8 +20,8 @@ from contfric.errors import ModelError
 from contfric.models.definition import Domain, Surface
 from contfric.models.description import Description, ModeText
 from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.grammar import parse
-from contfric.models.on_disk import derived
+from contfric.models.generated.on_disk import derived
+from contfric.models.language.grammar import parse
 from contfric.models.regions import domains_of, engine_order, is_possible
 
 #: Functions with kinks: what they are on either side of a surface only formulas tell.
@@ -187,7 +187,7 @@ class _Fields:
     @cached_property
     def _formulas(self) -> dict[str, list[Any]]:
         """The fields of each mode on its pieces."""
-        from contfric.models.symbols import Formulas
+        from contfric.models.generated.symbols import Formulas
 
         formulas = Formulas(self.description)
         fields, pieces = formulas.fields, len(formulas.pieces)

@@ -16,14 +16,8 @@ from contfric.models.overlapping import nearest, turned_back
 from contfric.models.parts import across, led
 
 if TYPE_CHECKING:
-    from contfric.models.parts import (
-        Departure,
-        Domain,
-        FloatArray,
-        Reset,
-        Surface,
-        Symmetry,
-    )
+    from contfric.base.arrays import FloatArray
+    from contfric.models.parts import Departure, Domain, Reset, Surface, Symmetry
 
 
 class TransitionMaps(ChatterMaps):
@@ -40,7 +34,7 @@ class TransitionMaps(ChatterMaps):
 
     @property
     def composed(self) -> bool:
-        """Whether modes are made when they are visited (:mod:`contfric.models.structure_model`)."""
+        """Whether modes are made when they are visited (:mod:`contfric.models.structures.growing_model`)."""
         return False
 
     def mode_order(self, name: str) -> int:

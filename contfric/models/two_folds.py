@@ -33,15 +33,16 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import Domain, FloatArray, Model
+from contfric.models.definition import Domain, Model
 from contfric.models.description import Description
-from contfric.models.formulas import vanishes
-from contfric.models.numbers import function_of_numbers
-from contfric.models.symbols import Formulas
-from contfric.models.tied import tied
+from contfric.models.generated.symbols import Formulas
+from contfric.models.language.formulas import vanishes
+from contfric.models.language.numbers import function_of_numbers
+from contfric.models.shorthand.tied import tied
 
 #: Newton's method: steps, and what is short, relative to the natural sizes.
 _STEPS, _SHORT = 60, 1e-12

@@ -16,7 +16,8 @@ from contfric.base.attributes import cached_property
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:
-    from contfric.models.definition import FloatArray, Model
+    from contfric.base.arrays import FloatArray
+    from contfric.models.definition import Model
 
 _NONE = np.empty(0, dtype=np.int64)
 _EMPTY, _NOTHING = np.empty(0), np.empty((0, 0))

@@ -7,7 +7,7 @@ the surface g = 0 at which it ends, and the last joint is the first one again, n
 
 (A symmetric orbit is solved on half a period, closed by the symmetry.) This multi-segment problem is that
 of H. Dankowicz, F. Schilder, Recipes for Continuation (SIAM 2013). Its Jacobian is exact, its elimination
-costs as much as there are segments (:mod:`~contfric.orbit.cyclic`), and gives the derivative M of the
+costs as much as there are segments (:mod:`~contfric.bvp.cyclic`), and gives the derivative M of the
 return map, whose eigenvalues are the Floquet multipliers. A solution is *admissible* if no inequality is
 violated inside a segment; that is decided at all stationary points of the observables. See
 ``docs/numerics.md``.

@@ -16,12 +16,12 @@ import numpy as np
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError
 from contfric.models.check.period import undeclared_angles
 from contfric.models.check.probe import Probe
-from contfric.models.clocks import is_clock
 from contfric.models.definition import Model
-from contfric.orbit.simulation import SimulationEnd, Trajectory, simulate
-from contfric.orbit.starts import left_through
-from contfric.orbit.structure import open_ends
-from contfric.orbit.time_scale import clock_period
+from contfric.models.mode_domains import open_ends
+from contfric.models.shorthand.clocks import is_clock
+from contfric.simulation.simulate import SimulationEnd, Trajectory, simulate
+from contfric.simulation.starts import left_through
+from contfric.simulation.time_scale import clock_period
 
 #: Longest period that is looked for, in periods of the excitation.
 MOST_PERIODS = 64

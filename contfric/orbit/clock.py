@@ -1,12 +1,13 @@
 """Where the time of an orbit begins: anywhere by the excitation, and where a turn ends without one.
 
 Every shift of an autonomous orbit in time is one too. Its joints are kept with the end of the turn at
-time 0, so that the first of them is minus the duration of the turn (:mod:`contfric.orbit.equations`).
+time 0, so that the first of them is minus the duration of the turn (:mod:`contfric.bvp.equations`).
 """
 
 from __future__ import annotations
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.models.definition import Model
 
 
 def clocked(model: Model, joints: FloatArray, end: float) -> FloatArray:

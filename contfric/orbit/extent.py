@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
+from contfric.bvp.equations import LayoutType, close_chain, equation_workspace
+from contfric.bvp.monitor import start_value
+from contfric.bvp.stationary_points import find_after_reset, find_stationary, stationary_workspace
 from contfric.compiled import i8, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.equations import LayoutType, close_chain, equation_workspace
-from contfric.orbit.monitor import start_value
-from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
 
 
 @kernel(types.boolean(FlowType, LayoutType, i8, matrix, vector, vector))

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ConvergenceError, function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.orbit.aperiodic import (
     MOST,
     MOST_PERIODS,
@@ -28,10 +29,10 @@ from contfric.orbit.kept_positions import Places
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.recurrences import EXACT, orbit_come_to, recurrences
 from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, is_point, winds
-from contfric.orbit.simulation import SimulationEnd, Trajectory, go_on, simulate
 from contfric.orbit.sizes import warn_of_sizes
-from contfric.orbit.time_scale import clock_period, time_scale
 from contfric.remember.journal import remembered
+from contfric.simulation.simulate import SimulationEnd, Trajectory, go_on, simulate
+from contfric.simulation.time_scale import clock_period, time_scale
 
 #: A solution that returns this near and still does not converge creeps along a continuum of orbits.
 _CREEPING = 1e-5
@@ -123,7 +124,7 @@ def simulated_orbit(
     search = _Search(model, params, state, time, longest, progress)
     trajectory = search.begin()
     if trajectory.end is SimulationEnd.CHATTER and not model.chatters:
-        from contfric.models.chatter import with_chatter  # which takes sympy
+        from contfric.models.shorthand.chatter import with_chatter  # which takes sympy
 
         resting = with_chatter(model)
         if resting is not None:

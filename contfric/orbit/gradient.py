@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ConvergenceError
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.at_once import differentiated_at_once
 from contfric.quantities.measure import NumberWithGradient, differentiated
@@ -139,7 +139,7 @@ def joint_sensitivities(orbit: Orbit) -> FloatArray:
     """
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
-    from contfric.orbit.moved import move_joints
+    from contfric.bvp.joint_derivatives import move_joints
 
     system, vector = orbit.system, orbit.vector
     moved = np.empty((*orbit.joints.shape, len(vector)))

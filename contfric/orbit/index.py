@@ -32,11 +32,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.bvp.linear import jacobian_blocks
+from contfric.bvp.system import System, inside_sign
+from contfric.models.definition import Model
 from contfric.models.view import FlowView
-from contfric.orbit.linear import jacobian_blocks
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import System, inside_sign
 
 #: A determinant this small against the product of its rows' lengths has no sign that rounding leaves alone.
 _NO_SIGN = 1e-13

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.bvp.equations import EquationWorkspace, equation_workspace
 from contfric.compiled import allocating_helper, helper
-from contfric.models.definition import FloatArray
-from contfric.orbit.equations import EquationWorkspace, equation_workspace
-from contfric.orbit.system import IntArray
 from contfric.quantities.operations import differentiate_tape, evaluate_tape
 from contfric.quantities.panels import (
     DEEPEST,

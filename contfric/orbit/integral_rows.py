@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.after_reset import apply_reset
 from contfric.compiled import allocating_helper, helper, indices, table, vector
-from contfric.models.definition import FloatArray
-from contfric.orbit.after_reset import apply_reset
 from contfric.orbit.integral_parts import integral_workspace
 from contfric.orbit.peak import extreme_workspace, fill_cycle
 from contfric.quantities.tape import Tape

@@ -21,10 +21,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import types
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.equations import LayoutType
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.models.definition import FloatArray
-from contfric.orbit.equations import LayoutType
 from contfric.orbit.integral_parts import (
     AFTER_A_CUT,
     ALL_AT_ONCE,
@@ -321,7 +321,7 @@ def integrals_of(
 
 def _carried(orbit: Orbit, tape: Tape, engine: Any, at: Any, found: Any) -> bool:
     """Carry the integrals along as states, where that is the way; tell whether they were found so."""
-    from contfric.orbit.carried import carried_by, carry
+    from contfric.orbit.integral_states import carried_by, carry
 
     flow = carried_by(orbit.model, tape)
     return flow is not None and bool(carry(*engine, flow.address, *at, *found))

@@ -7,9 +7,10 @@ from functools import cache
 
 import numpy as np
 
+from contfric.base.arrays import IntArray
+from contfric.bvp.system import Itinerary
 from contfric.models.definition import Model
-from contfric.orbit.structure import exit_domains
-from contfric.orbit.system import IntArray, Itinerary
+from contfric.models.mode_domains import exit_domains
 from contfric.signature.reduced import mirror_pair
 
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.conserved import conserved
 from contfric.errors import ConvergenceError, ParameterError, did_you_mean, real_number
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.models.evaluate import Evaluator, floats
-from contfric.orbit.conserved import conserved
 from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
-    from contfric.models.contact_laws import ContactLaws
+    from contfric.models.structures.contact_laws import ContactLaws
     from contfric.orbit.orbit import Orbit
 
 #: Directions that differ by less are the same: a combination of rates whose zeros are known to 1e-9.
@@ -218,7 +219,7 @@ class Places:
         """Return the state that a simulation starts from: the contacts at their places, and at rest."""
         if not (self.given or self.stated):
             return state
-        from contfric.orbit.starts import checked_state
+        from contfric.simulation.starts import checked_state
 
         y = checked_state(self.model, self.model.vector(self.params), state)
         return stuck_at(self.model, y, self._all)

@@ -19,10 +19,11 @@ from functools import cache
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.conserved import conserved, sampled_states
-from contfric.orbit.system import Itinerary
+from contfric.bvp.conserved import conserved, sampled_states
+from contfric.bvp.system import Itinerary
+from contfric.models.definition import Model
 
 #: How well rates are explained by heights, relative to the largest of these: rounding.
 _ZERO = 1e-9

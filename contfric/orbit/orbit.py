@@ -9,22 +9,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
 from contfric.base.renamed import renamed
 from contfric.base.tabled import as_table
 from contfric.base.tally import tally
+from contfric.bvp.linear import of_two_halves, pencil_of_turn
+from contfric.bvp.system import Itinerary, System, build_system
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.clock import clocked
 from contfric.orbit.itineraries import half_of, mirror_pairs, whole_of
-from contfric.orbit.linear import of_two_halves, pencil_of_turn
-from contfric.orbit.measured import MeasuredOrbit
-from contfric.orbit.reading import read_signature
+from contfric.orbit.measured_quantities import MeasuredOrbit
+from contfric.orbit.read_signature import read_signature
 from contfric.orbit.samples import samples, state_within
-from contfric.orbit.slack import margin_slack, no_time
 from contfric.orbit.stops import reach_of, stops_of
-from contfric.orbit.system import Itinerary, System, build_system
+from contfric.orbit.tolerances import margin_slack, no_time
 from contfric.signature import Signature
 
 if not TYPE_CHECKING:
@@ -241,7 +242,7 @@ class Orbit(MeasuredOrbit):
 
     @cached_property
     def _watched(self) -> tuple[FloatArray, NDArray[np.int64], bool]:
-        from contfric.orbit.monitor import examine
+        from contfric.bvp.monitor import examine
 
         layout, count = self.system.layout, len(self.system.tests)
         watched = np.empty(count + len(layout.labels))
@@ -252,7 +253,7 @@ class Orbit(MeasuredOrbit):
     @cached_property
     def turn_multipliers(self) -> ComplexArray:
         """Multipliers of one turn, largest first, shape (n,); (n - 1,) without the 1 of autonomous models."""
-        from contfric.orbit.spectrum import stability
+        from contfric.bvp.spectrum import stability
 
         mu = np.full(len(self.model.states), np.inf, dtype=np.complex128)
         if self.system.holds:  # the least disturbance ends a hold: it is no flow

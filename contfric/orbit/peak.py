@@ -13,18 +13,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import types
 
-from contfric.compiled import allocating_helper, f8, helper, i8, kernel, matrix, vector
-from contfric.flow.layouts import FlowType
-from contfric.models.definition import FloatArray
-from contfric.orbit.after_reset import apply_reset
-from contfric.orbit.equations import (
+from contfric.base.arrays import FloatArray
+from contfric.bvp.after_reset import apply_reset
+from contfric.bvp.equations import (
     EquationWorkspace,
     LayoutType,
     close_chain,
     equation_workspace,
     segment_jacobian,
 )
-from contfric.orbit.stationary import find_after_reset, find_stationary, stationary_workspace
+from contfric.bvp.stationary_points import find_after_reset, find_stationary, stationary_workspace
+from contfric.compiled import allocating_helper, f8, helper, i8, kernel, matrix, vector
+from contfric.flow.layouts import FlowType
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import build_system
 from contfric.orbit.aperiodic import MOST_PERIODS
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
@@ -14,10 +15,9 @@ from contfric.orbit.repetition import shortest
 from contfric.orbit.rest import creeps
 from contfric.orbit.section_crossings import loops
 from contfric.orbit.sections import is_smooth, without_sections
-from contfric.orbit.simulation import Trajectory
 from contfric.orbit.solve import centred, refine_with_symmetry
-from contfric.orbit.system import build_system
 from contfric.signature.cyclic import primitive_length
+from contfric.simulation.simulate import Trajectory
 
 #: Most events of a cycle that is looked for: 64 periods of an orbit with 32 joints.
 _MOST_EVENTS = 2048

@@ -7,7 +7,7 @@ excess of its load, at most like e, lasts for a time like the root of e: it gets
 ``e**(3/2)``, and ``c = k e**2``. For any ``c = k e**p`` with a small c/e the ratio r of two creeps is
 ``1 - p c/e``, so that ``q = c/(1 - r) = e/p``; and q falls by c/p from one creep to the next, which gives p
 (for p = 1 both hold for any r). What the motion comes to is an orbit of the itinerary without these slides,
-at a position by e farther on: one of a continuum (:mod:`contfric.orbit.conserved`).
+at a position by e farther on: one of a continuum (:mod:`contfric.bvp.conserved`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.conserved import conserved
 from contfric.errors import ConvergenceError
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.conserved import conserved
+from contfric.models.definition import Model
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import Trajectory
+from contfric.simulation.simulate import Trajectory
 
 #: A motion of which all events of a period are at one state, to rounding, is at rest if it does not move
 #: within a time either.

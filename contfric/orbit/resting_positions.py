@@ -1,6 +1,6 @@
 r"""Where contacts rest that never slip along an orbit, and where else they may: positions of a continuum.
 
-What an orbit conserves (:mod:`contfric.orbit.conserved`) is, in a structure, the position of each contact
+What an orbit conserves (:mod:`contfric.bvp.conserved`) is, in a structure, the position of each contact
 that sticks all along: the displacement of friction, the place of a Jenkins element's slider. Elsewhere it is
 a linear function of the states without a name, that of the reduced basis.
 
@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
+from contfric.bvp.conserved import conserved
 from contfric.errors import ContfricError, ParameterError
-from contfric.models.definition import FloatArray
-from contfric.orbit.conserved import conserved
 from contfric.orbit.kept_positions import (
     Position,
     at_rest,
@@ -30,8 +30,8 @@ from contfric.orbit.kept_positions import (
     places_of,
     positions_of,
 )
-from contfric.orbit.slack import margin_slack
 from contfric.orbit.solve import refine, refine_with_symmetry
+from contfric.orbit.tolerances import margin_slack
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

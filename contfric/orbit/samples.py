@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import whole_number
-from contfric.models.definition import FloatArray
-from contfric.orbit.reading import segment_domains
-from contfric.orbit.starts import signs_at
+from contfric.orbit.read_signature import segment_domains
+from contfric.simulation.starts import signs_at
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -39,7 +39,8 @@ def samples(
 
     Parameters
     ----------
-    labels : passages through transparent surfaces, as for :func:`contfric.orbit.reading.segment_domains`
+    labels : passages through transparent surfaces, as for
+    :func:`contfric.orbit.read_signature.segment_domains`
     points : about how many samples; each segment has three at least
     """
     points = whole_number("points", points, least=1, most=_MOST_SAMPLES)

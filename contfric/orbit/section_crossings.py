@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Itinerary
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import Itinerary
 
 #: A crossing this slow compared with the fastest one is that of a small loop.
 _SMALL = 0.2

@@ -8,22 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.tally import tally
+from contfric.bvp.conserved import conserved
+from contfric.bvp.system import System, build_system
 from contfric.errors import ConvergenceError, ParameterError, function_of, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray
-from contfric.models.tied import tied
+from contfric.models.shorthand.tied import tied
 from contfric.orbit.clock import clocked
-from contfric.orbit.conserved import conserved
-from contfric.orbit.excitation import check_excitation
 from contfric.orbit.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.sections import has_sections, named_by_ends
-from contfric.orbit.simulation import Trajectory, run
-from contfric.orbit.starts import start_of
-from contfric.orbit.system import System, build_system
 from contfric.remember.journal import SLOW, remembered
 from contfric.signature import Signature, reduced_itinerary
+from contfric.simulation.excitation import check_excitation
+from contfric.simulation.simulate import Trajectory, run
+from contfric.simulation.starts import start_of
 
 #: What the kernel's numbers mean.
 _STATUSES = tuple(Status)
@@ -50,7 +50,7 @@ def refine(orbit: Orbit, damped: bool = True) -> Orbit:
     damped : bool
         Whether long corrections are cut: for starts that may be far.
     """
-    from contfric.orbit.newton import solve
+    from contfric.bvp.newton import solve
 
     joints, vector = orbit.joints.copy(), orbit.vector.copy()
     m = joints.shape[1]

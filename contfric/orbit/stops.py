@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Itinerary
+from contfric.models.definition import Model
 from contfric.orbit.samples import stationary_within
-from contfric.orbit.system import Itinerary
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

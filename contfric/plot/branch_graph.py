@@ -28,7 +28,7 @@ from contfric.plot.style import BRIDGE_COLOUR, GREY, branch_colours
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation
+    from contfric.events.bifurcation import Bifurcation
 
 #: Relative: bifurcations of one kind this near in the parameter, on the same branches, are mirror images.
 _SAME = 1e-9

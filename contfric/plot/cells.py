@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 
 
 def draw_cells(ax: Axes, axes: Mapping[str, FloatArray], values: Any, **look: Any) -> QuadMesh:

@@ -35,7 +35,7 @@ from contfric.plot.style import (
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation
+    from contfric.events.bifurcation import Bifurcation
     from contfric.models.definition import Model
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep

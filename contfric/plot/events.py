@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.plot.labels import Anchor, near, place_labels
 from contfric.plot.names import event_label
 from contfric.plot.runs import counted, quantity
@@ -17,7 +17,7 @@ from contfric.plot.style import MARKERS, OTHER_MARKER, sized
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation, Kind
+    from contfric.events.bifurcation import Bifurcation, Kind
     from contfric.quantities.registry import QuantityLike
 
 #: Relative: events of one kind this near in the parameter are images of one another.

@@ -20,7 +20,7 @@ from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.plot.style import GREY, SMALL, sized
 
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
-from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor
 from contfric.plot.names import parameter_label, surface_label
 from contfric.plot.pieces import DomainPiece, rest_bounds, rest_limits

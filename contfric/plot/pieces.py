@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import either
-from contfric.models.definition import FloatArray
 from contfric.plot.labels import Anchor, lay_out, place_labels
 from contfric.plot.names import event_label, parameter_label
 from contfric.plot.save import axes_or_new, name_axes

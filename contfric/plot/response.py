@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 from matplotlib.axes import Axes
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray
 from contfric.plot.names import fixed_text, parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import GREY, SMALL, TEXT, lighter, sized

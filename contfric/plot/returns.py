@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import GREY, LINE_WIDTH, branch_colours, lighter
 

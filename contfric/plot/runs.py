@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.quantities.registry import NAMED
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation
+    from contfric.events.bifurcation import Bifurcation
     from contfric.orbit.orbit import Orbit
     from contfric.quantities.registry import QuantityLike
 

@@ -11,15 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, path_of, whole_number
-from contfric.models.definition import FloatArray
 from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, new_figure
 from contfric.plot.style import BLACK, NEXT_TO, SMALL, branch_colours, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
-    from contfric.orbit.simulation import Trajectory
+    from contfric.simulation.simulate import Trajectory
 
 #: Widths of lines; many turns over each other are told apart by thin ones.
 _THIN, _POINT = 0.8, 3.0

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from contfric.models.quantity_texts import Functional
+from contfric.models.language.quantity_texts import Functional
 from contfric.quantities.extreme import integrated, is_compiled
 from contfric.quantities.functionals import Asked, Measuring, Totals
 from contfric.quantities.inside import Inside, inside_of

@@ -15,7 +15,7 @@ import numpy as np
 from contfric.errors import ContfricError
 
 if TYPE_CHECKING:
-    from contfric.models.definition import FloatArray
+    from contfric.base.arrays import FloatArray
     from contfric.models.parts import Chatter
     from contfric.quantities.motion import MeasuredSegment
 

@@ -6,5 +6,5 @@ from __future__ import annotations
 CONSTANT, TIME, STATE, PARAMETER, OBSERVABLE = range(5)
 #: What is made of others.
 NEGATE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, WHERE = range(5, 12)
-#: Functions of one argument, in the order of :data:`contfric.models.grammar.UNARY`.
+#: Functions of one argument, in the order of :data:`contfric.models.language.grammar.UNARY`.
 FIRST_FUNCTION = 12

@@ -1,8 +1,8 @@
 """Numbers that carry their derivatives (forward mode), in arrays: expressions are evaluated in them.
 
 A :class:`Dual` holds k values and their derivatives in D directions. The algebra has the functions of
-:mod:`contfric.models.grammar`; every argument of ``abs``, ``sign`` and ``where`` is noted, as an expression
-has its kinks and jumps where such an argument changes its sign.
+:mod:`contfric.models.language.grammar`; every argument of ``abs``, ``sign`` and ``where`` is noted, as an
+expression has its kinks and jumps where such an argument changes its sign.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any, Union
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
-from contfric.models.grammar import Algebra
+from contfric.base.arrays import FloatArray
+from contfric.models.language.grammar import Algebra
 
 Number = Union["Dual", float]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 from typing import TYPE_CHECKING, NamedTuple
 
-from contfric.models.definition import FloatArray, Model
-from contfric.models.quantity_texts import WORK, Functional, Parsed, read
+from contfric.base.arrays import FloatArray
+from contfric.models.definition import Model
+from contfric.models.language.quantity_texts import WORK, Functional, Parsed, read
 from contfric.quantities.registry import NAMED, Quantity
 
 if TYPE_CHECKING:

@@ -21,10 +21,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import cached_property
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray
-from contfric.models.quantity_texts import WORK, Functional
+from contfric.models.language.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
 from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
 from contfric.quantities.inside import Inside

@@ -10,18 +10,19 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean
-from contfric.models.definition import FloatArray, Model
-from contfric.models.grammar import PI, TIME, Scope, names_in, parse
-from contfric.models.quantity_texts import FORCE_OF, WORK, Functional, no_contact
-from contfric.models.structure_model import ComposedModel
+from contfric.models.definition import Model
+from contfric.models.language.grammar import PI, TIME, Scope, names_in, parse
+from contfric.models.language.quantity_texts import FORCE_OF, WORK, Functional, no_contact
+from contfric.models.structures.growing_model import ComposedModel
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function
 from contfric.quantities.tape import Tape, tape_of
 
 if TYPE_CHECKING:
-    from contfric.models.contact_laws import ContactLaws
+    from contfric.models.structures.contact_laws import ContactLaws
 
 
 class Inside:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ContfricError, ParameterError, shown
-from contfric.models.definition import FloatArray
-from contfric.models.grammar import Scope
-from contfric.models.quantity_texts import Parsed, read
+from contfric.models.language.grammar import Scope
+from contfric.models.language.quantity_texts import Parsed, read
 from contfric.quantities.duals import Dual, Kinks, constant, divide
 from contfric.quantities.extreme import integrated, moved_peak, peak_of
 from contfric.quantities.functionals import Asked, Measuring, Totals

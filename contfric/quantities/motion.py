@@ -24,8 +24,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.attributes import cached_property
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.quantities.chatter import pieces
 from contfric.quantities.duals import Dual
 

@@ -18,9 +18,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.errors import ContfricError
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.quantities.duals import Dual, Kinks
 from contfric.quantities.motion import IndexArray, MeasuredSegment, Pieces, Place
 

@@ -1,9 +1,9 @@
 """The one list of quantities: what rows, tables, stop values and gradients call by the same names.
 
 A quantity is one of the bundled names, one that the model's file declares, an expression
-(:mod:`contfric.models.quantity_texts`), or a function of an orbit. It is looked up and checked here, before
-anything is computed. A function that can be imported has a name, too, ``module:function``: files, studies and
-other processes ask for it by that.
+(:mod:`contfric.models.language.quantity_texts`), or a function of an orbit. It is looked up and checked
+here, before anything is computed. A function that can be imported has a name, too, ``module:function``:
+files, studies and other processes ask for it by that.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ import numpy as np
 
 from contfric.errors import ModelError, ParameterError, did_you_mean, shown
 from contfric.models.definition import Model
-from contfric.models.grammar import FLOATS, PI, Scope
-from contfric.models.quantity_texts import FUNCTIONALS, Parsed, read
+from contfric.models.language.grammar import FLOATS, PI, Scope
+from contfric.models.language.quantity_texts import FUNCTIONALS, Parsed, read
 from contfric.quantities.inside import Inside, inside_of
 
 if TYPE_CHECKING:

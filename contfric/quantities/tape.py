@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.grammar import TIME as TIME_NAME
-from contfric.models.grammar import UNARY, Algebra, Scope
+from contfric.models.language.grammar import TIME as TIME_NAME
+from contfric.models.language.grammar import UNARY, Algebra, Scope
 from contfric.quantities.codes import (
     ADD,
     CONSTANT,
@@ -41,7 +41,8 @@ from contfric.quantities.codes import (
 )
 
 if TYPE_CHECKING:
-    from contfric.models.definition import FloatArray, Model
+    from contfric.base.arrays import FloatArray
+    from contfric.models.definition import Model
 
 
 class Tape(NamedTuple):

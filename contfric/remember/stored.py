@@ -21,8 +21,17 @@ import numpy as np
 _PACKAGE = "contfric"
 #: Names that classes had when files were written, and have now.
 _RENAMED = {
-    "contfric.continuation.events:Verdict": "contfric.continuation.events:Decision",
+    "contfric.continuation.events:Verdict": "contfric.events.bifurcation:Decision",
     "contfric.equilibria.regions:Region": "contfric.equilibria.regions:ModeRegion",
+}
+#: Modules that classes had when files were written, and have now.
+_MOVED = {
+    "contfric.continuation.events": "contfric.events.bifurcation",
+    "contfric.continuation.measured_event": "contfric.events.measured_event",
+    "contfric.orbit.holds": "contfric.bvp.holds",
+    "contfric.orbit.margins": "contfric.bvp.margins",
+    "contfric.orbit.simulation": "contfric.simulation.simulate",
+    "contfric.orbit.system": "contfric.bvp.system",
 }
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.
 _MANY = 8
@@ -309,6 +318,7 @@ def _path(kind: type) -> str:
 
 def _class(path: str, base: type) -> Any:
     module, _, name = _RENAMED.get(path, path).partition(":")
+    module = _MOVED.get(module, module)
     if module.split(".")[0] != _PACKAGE:
         raise TypeError(f"{path} is no class of {_PACKAGE}")
     try:

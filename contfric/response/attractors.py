@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import (
     ConvergenceError,
     ParameterError,
     items_of,
     shown,
 )
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.find import find_orbit
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine_with_symmetry
@@ -60,7 +61,7 @@ class Attractors:
 
     def rest_at_walls(self) -> bool:
         """Take the model with chatter at its walls, as `find_orbit` does; whether there is one."""
-        from contfric.models.chatter import with_chatter  # which takes sympy
+        from contfric.models.shorthand.chatter import with_chatter  # which takes sympy
 
         resting = with_chatter(self.model)
         if resting is not None:

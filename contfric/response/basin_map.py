@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor, duration
 from contfric.chaos.status import Motion
@@ -27,16 +28,15 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.excitation import check_excitation
-from contfric.orbit.starts import within_a_turn
-from contfric.orbit.system import IntArray
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile
 from contfric.response.basins import Basins
 from contfric.response.sweeping import checked_values
+from contfric.simulation.excitation import check_excitation
+from contfric.simulation.starts import within_a_turn
 
 #: Starts, spread over the grid, whose orbits are found before all others: any basin of a tenth of the grid
 #: is hit by one of them with probability 0.999; those that are not are found when the grid is done.

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.rows import FollowingLimits, follow, new_stop, starting, until_interrupted
 from contfric.chaos.status import Motion
 from contfric.chaos.work import TileTask
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.system import IntArray
-from contfric.orbit.tables import tables
-from contfric.orbit.time_scale import ticks_of
+from contfric.models.definition import Model
 from contfric.response.targets import Targets
+from contfric.simulation.tables import tables
+from contfric.simulation.time_scale import ticks_of
 
 #: Periods before the growth of a separation is averaged, and its relative error, for what no orbit has
 #: caught: those of Lyapunov exponents.
@@ -59,8 +59,8 @@ class BasinTile(TileTask):
 def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRows:
     """Compute a tile; what it returns depends on nothing but the task."""
     from contfric.chaos import tangent
-    from contfric.orbit import trajectory
     from contfric.response.capture import capture
+    from contfric.simulation import march as trajectory
 
     count = len(task.states)
     labels, ends, followed = np.zeros((3, count), dtype=np.int64)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_xarray
 from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.status import Motion
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.response.attractors import named
 

@@ -23,9 +23,9 @@ from contfric.chaos.tangent import (
 )
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.sides import surfaces_after
-from contfric.orbit.trajectory import TablesType
 from contfric.response.targets import Targets
+from contfric.simulation.march import TablesType
+from contfric.simulation.sides import surfaces_after
 
 TargetsType = types.NamedTuple([indices, matrix, indices, vector], Targets)
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.rows import new_stop, starting, until_interrupted
 from contfric.chaos.running import Progress
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray, Model
-from contfric.orbit.starts import displaced
-from contfric.orbit.system import IntArray
-from contfric.orbit.tables import tables
+from contfric.models.definition import Model
 from contfric.response.cuts import (
     Cut,
     Ends,
@@ -21,6 +19,8 @@ from contfric.response.cuts import (
     empty_points,
 )
 from contfric.response.outcome import Outcome
+from contfric.simulation.starts import displaced
+from contfric.simulation.tables import tables
 
 #: Points that there is space for at first, for each solution.
 _POINTS = 64

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.models.definition import FloatArray
-from contfric.orbit.simulation import EventRows
-from contfric.orbit.system import IntArray
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.simulation.simulate import EventRows
 
 #: Events that are followed between two looks at the section: a period or two of most orbits.
 BATCH = 16

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.compiled import allocating_helper, helper
-from contfric.models.definition import FloatArray
-from contfric.orbit.system import IntArray
-from contfric.orbit.trajectory import CARRIED, StateWorkspace, copy_state, whole_turns
+from contfric.simulation.march import CARRIED, StateWorkspace, copy_state, whole_turns
 
 #: Joints that are remembered: one for short cycles, one for long ones.
 MEMORIES = 2

@@ -12,15 +12,15 @@ from contfric.errors import (
 )
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.tied import tied
-from contfric.orbit.starts import checked_state
-from contfric.orbit.time_scale import clock_period
+from contfric.models.shorthand.tied import tied
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following, SectionPoints
 from contfric.response.outcome import Outcome
 from contfric.response.returns import Returns
 from contfric.response.sections import SectionLike, section_of, usual_section
 from contfric.response.sweeping import positive
+from contfric.simulation.starts import checked_state
+from contfric.simulation.time_scale import clock_period
 
 #: Points without a limit, as the kernel takes them.
 _ALL = np.iinfo(np.int64).max

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.memory import must_fit
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.work import TileTask, Work, put_rows
 from contfric.errors import function_of, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.system import IntArray
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following

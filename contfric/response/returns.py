@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_flint
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown, whole_number
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.response.outcome import Outcome
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """The points of solutions on a section, compiled.
 
-Solutions are followed by the simulation of :mod:`contfric.orbit.trajectory`, a few events at a time, and
+Solutions are followed by the simulation of :mod:`contfric.simulation.march`, a few events at a time, and
 every segment is cut: at a phase of the excitation by the flow itself, on a surface by its first roots, at
 joints by their surface. No time step enters.
 
@@ -19,8 +19,9 @@ from contfric.chaos.cycle import nearest_turn
 from contfric.chaos.starting import start_mode
 from contfric.compiled import f8, helper, i8, indices, kernel, matrix, table, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.sides import surfaces_after
-from contfric.orbit.trajectory import (
+from contfric.response.cuts import BATCH, Cut, Ends, Following, SectionPoints
+from contfric.response.cutting import MEMORIES, cut_inside, cut_joint, new_workspace, set_strobe
+from contfric.simulation.march import (
     ALL_EVENTS,
     ALL_TIME,
     CARRIED,
@@ -32,8 +33,7 @@ from contfric.orbit.trajectory import (
     copy_state,
     follow,
 )
-from contfric.response.cuts import BATCH, Cut, Ends, Following, SectionPoints
-from contfric.response.cutting import MEMORIES, cut_inside, cut_joint, new_workspace, set_strobe
+from contfric.simulation.sides import surfaces_after
 
 CutType = types.NamedTuple([table, indices, i8, i8, f8, i8], Cut)
 FollowingType = types.NamedTuple([f8, f8, f8, i8, i8], Following)

@@ -7,11 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import run
-from contfric.orbit.starts import start_of
+from contfric.simulation.simulate import run
+from contfric.simulation.starts import start_of
 
 #: Step of the differences that make the derivative of f: the cube root of rounding, in sizes of the orbit.
 _DIFFERENCE = 6e-6

@@ -7,12 +7,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from contfric.base.arrays import IntArray
 from contfric.errors import ParameterError, did_you_mean, real_number, shown
-from contfric.models.clocks import TICK
 from contfric.models.definition import Model
-from contfric.orbit.system import IntArray
-from contfric.orbit.tables import MAPPED, tables
+from contfric.models.shorthand.clocks import TICK
 from contfric.response.cuts import Cut
+from contfric.simulation.tables import MAPPED, tables
 
 #: "stops", "releases", the name of a surface (or kink), or a phase as a share of the period.
 SectionLike: TypeAlias = str | float

@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.chaos.running import Progress
-from contfric.models.definition import FloatArray
 from contfric.orbit.orbit import Orbit
 from contfric.remember.journal import remembered
 from contfric.response.section_map import NEAR, SectionMap, SpentError

@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.running import Progress
 from contfric.errors import ParameterError, function_of, real_number, shown, whole_number
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray
 from contfric.remember.folder import kept_in
 from contfric.response.section_map import SectionMap
 from contfric.response.stable_half import Half, StableEnd

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_xarray
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, shown
-from contfric.models.clocks import TICK
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
+from contfric.models.shorthand.clocks import TICK
 from contfric.response.outcome import Outcome
 from contfric.response.sections import STOPS
 

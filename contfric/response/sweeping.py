@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.memory import must_fit
 from contfric.chaos.compute import ascending
 from contfric.chaos.running import Progress, Timer, check_executor, compute_all
@@ -21,11 +22,8 @@ from contfric.chaos.tiles import inside
 from contfric.chaos.work import TileTask
 from contfric.errors import ParameterError, function_of, real_number, shown, truth
 from contfric.models import ModelSource
-from contfric.models.definition import FloatArray, Model
-from contfric.models.tied import tied
-from contfric.orbit.starts import checked_state
-from contfric.orbit.system import IntArray
-from contfric.orbit.time_scale import clock_period
+from contfric.models.definition import Model
+from contfric.models.shorthand.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.remember.journal import Parts
 from contfric.response.collecting import collect, repeats_of
@@ -33,6 +31,8 @@ from contfric.response.cuts import Cut, Following
 from contfric.response.outcome import Outcome
 from contfric.response.sections import SectionLike, section_of, usual_section
 from contfric.response.sweep import Sweep, SweepRun
+from contfric.simulation.starts import checked_state
+from contfric.simulation.time_scale import clock_period
 
 _DIRECTIONS = {"both": ("up", "down"), "up": ("up",), "down": ("down",)}
 #: Bytes of a value: its parameters, its result, and a few points.

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray, IntArray
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.system import IntArray
 
 #: A joint is at most so far from one of a stable orbit that it has converged to it (nondimensional, small
 #: against orbits of size 1): the linear map of the orbit holds there.

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean, shown
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
+from contfric.models.mode_domains import mirror_mode
 from contfric.models.view import FlowView
-from contfric.orbit.structure import mirror_mode
-from contfric.orbit.tables import tables
+from contfric.simulation.tables import tables
 
 #: A release counts if the surfaces are met to this (relative to 1 + state).
 _MET = 1e-12

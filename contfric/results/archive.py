@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.fitting.result import Fit
     from contfric.orbit.orbit import Orbit
-    from contfric.orbit.simulation import Trajectory
     from contfric.response.basins import Basins
     from contfric.response.returns import ReleaseMap, Returns
     from contfric.response.stable_set import StableSet
     from contfric.response.sweep import Sweep
+    from contfric.simulation.simulate import Trajectory
 
 #: By name: to write one kind of result, those of the others are not loaded.
 Saveable: TypeAlias = (

@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.continuation.events import Bifurcation, End
+from contfric.bvp.system import System, build_system
 from contfric.curves.special import SpecialPoint
 from contfric.equilibria.regions import ModeRegion, regions_of
 from contfric.errors import ResultFileError
+from contfric.events.bifurcation import Bifurcation, End
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import Trajectory
-from contfric.orbit.system import System, build_system
 from contfric.quantities.registry import name_of
 from contfric.remember.stored import Reader, UnstorableError, Writer, made_of
+from contfric.simulation.simulate import Trajectory
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -14,7 +14,6 @@ from contfric.atlas.plane import Plane
 from contfric.base.tabled import Tabled
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
-from contfric.continuation.events import Bifurcation
 from contfric.curves.curve import Curve
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.ensembles.ensemble import Ensemble
@@ -22,14 +21,15 @@ from contfric.ensembles.tables import events_table, samples_table
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.events import EquilibriumEvent
 from contfric.equilibria.explore import EquilibriumDiagram
+from contfric.events.bifurcation import Bifurcation
 from contfric.fitting.result import Fit
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.simulation import Trajectory
 from contfric.response.basins import Basins
 from contfric.response.returns import ReleaseMap, Returns
 from contfric.response.stable_set import StableSet
 from contfric.response.sweep import Sweep
+from contfric.simulation.simulate import Trajectory
 
 #: Results that are one table.
 OneTable: TypeAlias = (

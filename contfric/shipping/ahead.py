@@ -42,8 +42,8 @@ def every_kernel() -> dict[str, Kernel]:
     from contfric.flow.chattering import KERNELS as CHATTERING
     from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import FlowKind, kernels_of
-    from contfric.models.unit import callers
-    from contfric.orbit.carried import KERNELS as CARRYING
+    from contfric.models.generated.unit import callers
+    from contfric.orbit.integral_states import KERNELS as CARRYING
 
     found = [kernel for kind in FlowKind for kernel in kernels_of(kind)]
     found += [*CODED.values(), *CHATTERING.values(), *CARRYING.values(), *callers()]
@@ -61,7 +61,7 @@ def every_kernel() -> dict[str, Kernel]:
 def models_kernels() -> dict[str, Kernel]:
     """Return the kernels of the bundled models by their names; models whose formulas are tables have none."""
     from contfric.models import load_model
-    from contfric.models.build import GeneratedFlow, kernels_of
+    from contfric.models.generated.build import GeneratedFlow, kernels_of
     from contfric.models.library import bundled
 
     flows = [load_model(name).flow_factory for name in bundled()]

@@ -19,9 +19,9 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.matching import identity, stops_distance
+from contfric.base.arrays import FloatArray
 from contfric.censuses.itineraries import canonical_pair
 from contfric.censuses.sections import exit_arcs
-from contfric.models.definition import FloatArray
 from contfric.signature.reduced import mirror_pair
 
 TURN = 2.0 * math.pi

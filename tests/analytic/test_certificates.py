@@ -26,7 +26,7 @@ from contfric.certify.krawczyk import Equations, enclosed, krawczyk
 from contfric.certify.orbit import certify_orbit
 from contfric.certify.splitting import along
 from contfric.certify.verdict import Verdict
-from contfric.continuation.events import Bifurcation, Kind
+from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.linear import pencil_of_turn
 from contfric.continuation.switching import leave_along, null_direction
 from contfric.curves.trace import continue_bifurcation
-from contfric.orbit.linear import pencil_of_turn
 from tests.curve_check import miss
 
 PLANE = ("Omega", "S")

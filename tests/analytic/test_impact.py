@@ -114,8 +114,8 @@ def test_multipliers_agree_with_differences_of_the_return_map(moving: float) -> 
 
 
 def test_jacobian_agrees_with_differences() -> None:
-    from contfric.orbit.blocks import linearise
-    from contfric.orbit.linear import assembled
+    from contfric.bvp.blocks import linearise
+    from contfric.bvp.linear import assembled
 
     found = cf.find_orbit(impact, {**PARAMS, "a": 0.1}, state=STATE)
     system, h = found.system, 1e-6

@@ -11,7 +11,7 @@ import pytest
 from catalogue import OSCILLATOR
 from catalogue import flow as catalogue_flow
 
-from contfric.flow import forced_oscillator as closed
+from contfric.flow.oscillator import flow as closed
 
 NONE, EMPTY, NOTHING = np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 0))
 ALL = np.arange(5)

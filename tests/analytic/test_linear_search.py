@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.flow import forced_oscillator as by_hand
 from contfric.flow.linear.search import first_root, sixth_of
 from contfric.flow.linear.system import TERMS
+from contfric.flow.oscillator import flow as by_hand
 
 NONE, EMPTY, ALL = np.empty(0, dtype=np.int64), np.empty(0), np.arange(5)
 LOAD, SPEED, STICK = 0, 1, 2

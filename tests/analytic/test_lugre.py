@@ -12,13 +12,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
+from contfric.bvp.system import build_system
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
-from contfric.continuation.side import first_point
 from contfric.continuation.smooth import smooth_events
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 
 #: Integrated models from end to end: minutes of processor time, run by `make test-all`.
 pytestmark = pytest.mark.slow

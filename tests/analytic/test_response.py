@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpc, mpf
 
-from contfric.flow.forced_oscillator import flow
+from contfric.flow.oscillator.flow import flow
 
 DIGITS = 150
 EPS = np.finfo(float).eps

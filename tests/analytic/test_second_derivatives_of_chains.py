@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.continuation.crossing import _ChainProblem
-from contfric.orbit.system import build_system
 
 MODEL = cf.load_model("coulomb")
 OMEGA, S, S0, ZETA, WIDTH = 0.5, 0.32, 0.4, 0.07, 0.3

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.system import Margin
+from contfric.bvp.system import Margin
 
 PLANE = ("Omega", "S")
 SIGN = {"SN": 1, "PD": -1, "BP": -1}

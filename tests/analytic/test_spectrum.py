@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numba import types
 
+from contfric.bvp.spectrum import spectrum
 from contfric.compiled import f8, kernel, matrix, vector
-from contfric.orbit.spectrum import spectrum
 
 
 @kernel(types.UniTuple(f8, 2)(matrix, types.int64, types.complex128[::1], vector, matrix, matrix))

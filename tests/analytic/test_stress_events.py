@@ -17,7 +17,7 @@ from report import Tally
 
 import contfric as cf
 from contfric.continuation import accuracy
-from contfric.continuation.events import ACCURACY
+from contfric.events.bifurcation import ACCURACY
 
 DIAGRAMS = {
     "S": ({"Omega": 0.5, "S": 0.3, "S0": 0.4}, (0.03, 0.39)),

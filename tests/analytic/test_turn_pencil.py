@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contfric.orbit.turn import turn_pencil
+from contfric.bvp.pencil import turn_pencil
 
 
 def pencil_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,8 +11,8 @@ from sympy import Float, Symbol
 from typed import typed
 
 import contfric as cf
-from contfric.models.formulas import FORMULAS, formula, kinks_in, resolved
-from contfric.models.grammar import Scope, number_of, parse
+from contfric.models.language.formulas import FORMULAS, formula, kinks_in, resolved
+from contfric.models.language.grammar import Scope, number_of, parse
 
 #: A restoring force that begins beyond d, the same within d and beyond, and one with a limit.
 LAWS = (

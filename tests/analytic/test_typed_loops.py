@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric.continuation.kinds import kind_of_margin
+from contfric.events.sliding_kinds import kind_of_margin
 
 #: Two modes of a string, and friction that falls with the speed of sliding (Smith and Woodhouse 2000).
 BOW = """

@@ -12,9 +12,9 @@ from sympy import Symbol
 from typed import typed
 
 import contfric as cf
-from contfric.models.formulas import FORMULAS, formula, kinks_in
-from contfric.models.grammar import Scope, number_of, parse
-from contfric.models.products import factors
+from contfric.models.language.formulas import FORMULAS, formula, kinks_in
+from contfric.models.language.grammar import Scope, number_of, parse
+from contfric.models.language.products import factors
 
 #: A spring that is stiffer while it is loaded (Reid 1956), with a little viscous damping.
 REID = """

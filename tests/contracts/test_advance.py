@@ -16,9 +16,9 @@ import contfric as cf
 from contfric.atlas import departures
 from contfric.atlas.collect import Event
 from contfric.atlas.departures import foresee_departures
+from contfric.base.counts import Counts, counts
 from contfric.base.tally import tally
-from contfric.continuation.events import Kind
-from contfric.orbit.counts import Counts, counts
+from contfric.events.bifurcation import Kind
 from contfric.remember import advance
 from contfric.remember.advance import foresee, foreseeable, heed, in_advance
 

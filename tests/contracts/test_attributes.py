@@ -9,7 +9,7 @@ import pytest
 
 import contfric as cf
 from contfric.base.attributes import altered, cached_property
-from contfric.continuation.events import End, EndReason
+from contfric.events.bifurcation import End, EndReason
 from contfric.orbit.index import opening_sign, opening_signs
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}

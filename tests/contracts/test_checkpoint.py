@@ -14,8 +14,8 @@ import pytest
 import contfric as cf
 from contfric.cli import main
 from contfric.cli.exits import Exit
-from contfric.continuation.events import Decision
 from contfric.continuation.points import Point
+from contfric.events.bifurcation import Decision
 from contfric.remember import journal
 from contfric.remember.journal import Journal, keeping, remembered
 from contfric.remember.stored import Reader, UnstorableError, Writer

@@ -19,8 +19,8 @@ from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.compiling import announced
 from contfric.compiling.inlined import part_options
-from contfric.models import build
 from contfric.models.describe import describe
+from contfric.models.generated import build
 from contfric.shipping.ahead import every_kernel
 
 MODELS = Path(__file__).parents[1] / "models"

@@ -12,8 +12,9 @@ import pytest
 import yaml
 
 from contfric.base.resources import bundled_dir
-from contfric.models import build, files, sections, symbols
+from contfric.models import files, sections
 from contfric.models.describe import describe
+from contfric.models.generated import build, symbols
 from contfric.models.library import bundled, find
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import contfric as cf
-from contfric.orbit.simulation import Trajectory
 from contfric.results import Saveable
+from contfric.simulation.simulate import Trajectory
 from contfric.study.tasks import TASKS
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guide.md"

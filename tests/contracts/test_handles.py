@@ -17,7 +17,8 @@ from contfric.cli.doctor import stale_bytecode, write_bytecode
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, vector
 from contfric.flow.integrated import AffineModes, Functions
 from contfric.handle import ITSELF, TABLE, Block, Bound, HandleType, with_handle
-from contfric.models import build, load_model
+from contfric.models import load_model
+from contfric.models.generated import build
 from contfric.shipping.ahead import every_kernel, missing
 
 LAYOUT = {"scaled": f8(f8), "table": TABLE, "count": i8, "factor": f8, "other": ITSELF}
@@ -188,5 +189,5 @@ def test_doctor_writes_bytecode_where_it_is_missing_or_old(tmp_path, monkeypatch
 
 def test_every_kernel_of_the_package_is_known():
     names = set(every_kernel())
-    assert {"contfric.continuation.march.march", "contfric.flow.general.hit-stiff"} <= names
+    assert {"contfric.continuation.core.march.march", "contfric.flow.general.hit-stiff"} <= names
     assert not any(name.startswith("contfric_model") for name in names)

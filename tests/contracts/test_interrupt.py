@@ -31,11 +31,11 @@ import numpy as np
 import contfric as cf
 from contfric.censuses.sweep import sweep
 from contfric.chaos.cells import follow_cells
-from contfric.continuation.bracket import locate
-from contfric.continuation.march import march
+from contfric.continuation.core.locate import locate
+from contfric.continuation.core.march import march
 from contfric.curves.bracket import locate_on_curve
 from contfric.curves.march import march_curve
-from contfric.orbit.trajectory import simulate
+from contfric.simulation.march import simulate
 from contfric.response.capture import capture
 from contfric.response.section import cut_solutions
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import contfric as cf
-from contfric.atlas.anew import anew
+from contfric.atlas.other_parameters import anew
 from contfric.cli import main
 from contfric.plot.live.serve import _sliders, answered
 from contfric.plot.style import ROWS
@@ -52,7 +52,7 @@ def test_a_start_is_looked_for_along_the_range(
             raise cf.AperiodicError("nothing periodic")
         return cf.find_orbit(model, params)
 
-    monkeypatch.setattr("contfric.atlas.anew.find_orbit", finding)
+    monkeypatch.setattr("contfric.atlas.other_parameters.find_orbit", finding)
     assert anew(diagram, PARAMS).branches
     assert tried == pytest.approx([0.52, 0.5])
 

@@ -8,7 +8,7 @@ import pytest
 import sympy
 
 import contfric as cf
-from contfric.models import formulas
+from contfric.models.language import formulas
 
 MODEL = """
 name: {name}

@@ -10,9 +10,9 @@ import pytest
 
 import contfric as cf
 from contfric.base.resources import bundled_dir
-from contfric.continuation.events import meaning_of
 from contfric.continuation.points import LARGEST_STEP
 from contfric.curves.trace import largest_step
+from contfric.events.bifurcation import meaning_of
 from contfric.models.describe import from_text
 
 GOOD = """\

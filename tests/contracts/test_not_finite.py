@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.compiled import allocating_helper, flow_signature, kernel
-from contfric.flow import forced_oscillator
+from contfric.flow.oscillator import flow as forced_oscillator
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Status
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 #: The flow of the test model is not a number above this frequency.

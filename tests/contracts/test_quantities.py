@@ -15,7 +15,7 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ConvergenceError, ModelError, ParameterError
-from contfric.models.quantity_texts import BUNDLED, LIST
+from contfric.models.language.quantity_texts import BUNDLED, LIST
 from contfric.quantities.registry import NAMED, quantity_of
 
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}

@@ -6,7 +6,7 @@ import pytest
 
 import contfric as cf
 from contfric.censuses.result import Census
-from contfric.continuation.adding import Window
+from contfric.period_adding.windows import Window
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 

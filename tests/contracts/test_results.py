@@ -17,8 +17,8 @@ import pytest
 
 import contfric as cf
 from contfric.base import files
-from contfric.continuation.events import EndReason
-from contfric.orbit.system import build_system
+from contfric.bvp.system import build_system
+from contfric.events.bifurcation import EndReason
 from contfric.results.archive import _digests
 from contfric.signature import load_signature
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.events import End, EndReason
-from contfric.orbit.counts import counts
+from contfric.base.counts import counts
+from contfric.events.bifurcation import End, EndReason
 from contfric.study import UnwrittenError, make_plan, read_study, study_names
 from contfric.study.result import RunStatus
 

@@ -69,7 +69,7 @@ def test_a_map_alone_loads_no_continuation(write, tmp_path: Path) -> None:
     code = (
         "import sys, contfric as cf\n"
         "cf.run_study(sys.argv[1], sys.argv[2])\n"
-        "print([m for m in ('contfric.continuation.march', 'contfric.atlas.explore',"
+        "print([m for m in ('contfric.continuation.core.march', 'contfric.atlas.explore',"
         " 'matplotlib') if m in sys.modules])"
     )
     arguments = [sys.executable, "-c", code, str(path), str(tmp_path / "out")]

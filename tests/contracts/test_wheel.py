@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[2]
 #: Kernels that come with the wheel of these tests: those of the models, and some of the engine.
 SHIPPED = (
     "contfric_model_*.functions",
-    *("contfric.flow.forced_oscillator.period", "contfric.flow.forced_oscillator.level"),
+    *("contfric.flow.oscillator.flow.period", "contfric.flow.oscillator.flow.level"),
     "contfric.orbit.extent.extent",
 )
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 

@@ -224,6 +224,7 @@ def test_glossary_has_every_kind_and_end() -> None:
 
 def test_engine_constants_agree() -> None:
     """The number of extra tests stands twice, so that tracing is not compiled before it is used."""
-    from contfric.continuation import points, steps
+    from contfric.continuation import points
+    from contfric.continuation.core import steps
 
     assert points.EXTRA == steps.EXTRA

@@ -8,7 +8,7 @@ from dataclasses import replace
 import contfric as cf
 from contfric.flow.integrated import TOLERANCE
 from contfric.flow.interface import CompiledFlow
-from contfric.models.build import load_module
+from contfric.models.generated.build import load_module
 
 SPEED = 1
 

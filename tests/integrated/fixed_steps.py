@@ -5,11 +5,11 @@ from __future__ import annotations
 from catalogue import FUNCTIONS
 
 from contfric.compiled import allocating_helper, f8, i8, indices, kernel, types, vector
-from contfric.flow.dop853 import STAGES, explicit_step
 from contfric.flow.general import FlowKind, handle_of
-from contfric.flow.radau import IMPLICIT_STAGES, implicit_step
-from contfric.flow.stepping import accept_step
-from contfric.flow.variations import begin, integration_workspace, slope
+from contfric.flow.integration.dop853 import STAGES, explicit_step
+from contfric.flow.integration.radau import IMPLICIT_STAGES, implicit_step
+from contfric.flow.integration.stepping import accept_step
+from contfric.flow.integration.variations import begin, integration_workspace, slope
 from contfric.handle import Bound
 
 

@@ -10,8 +10,8 @@ import pytest
 from catalogue import OSCILLATOR, flow
 from fixed_steps import fixed_steps
 
-from contfric.flow import dop853
-from contfric.flow.collocation import collocation_matrix, radau_nodes
+from contfric.flow.integration import dop853
+from contfric.flow.integration.collocation import collocation_matrix, radau_nodes
 
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))
 PARAMETERS = np.array([1.0, 1e-13, *np.zeros(9)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.blocks import linearise
+from contfric.bvp.blocks import linearise
 from contfric.orbit.solve import refine
 
 CASES = {

@@ -12,10 +12,10 @@ import sympy
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric.models.affine import affine_form
-from contfric.models.formulas import FORMULAS, formula
-from contfric.models.grammar import Scope, number_of, parse
-from contfric.models.not_affine import NotAffineError
+from contfric.models.generated.affine import affine_form
+from contfric.models.language.formulas import FORMULAS, formula
+from contfric.models.language.grammar import Scope, number_of, parse
+from contfric.models.language.not_affine import NotAffineError
 
 NAMES = ("t", "x", "v", "w", "p")
 VALUES = dict(zip(NAMES, (0.37, 0.7, -0.2, 1.3, 0.45), strict=True))

@@ -10,13 +10,13 @@ import pytest
 import restarts
 
 import contfric as cf
+from contfric.bvp.linear import assembled
 from contfric.continuation.arms import arms_at, passages, turning_passages
-from contfric.continuation.events import Kind
 from contfric.continuation.points import settings_of
-from contfric.continuation.sequences import count, lengths
 from contfric.continuation.vertices import undoubled_part
-from contfric.orbit.apart import cyclic_apart, farthest_apart
-from contfric.orbit.linear import assembled
+from contfric.events.bifurcation import Kind
+from contfric.events.sequences import count, lengths
+from contfric.orbit.distance import cyclic_apart, farthest_apart
 
 #: Random scenes (of seed 31) with folds of bridges of several holds, and most periods of their orbits.
 SCENES = [(163, 1), (179, 1), (179, 2)]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.flow.linear.system import growth
-from contfric.models.definition import FloatArray
 
 
 def rate_and_spread(matrix: FloatArray) -> tuple[float, float]:

@@ -16,8 +16,8 @@ import pytest
 import contfric as cf
 from contfric.atlas import follow
 from contfric.atlas.crossings import whole_branch
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings, settings_of
-from contfric.continuation.side import first_point
 from contfric.curves.points import solve_point
 from contfric.curves.problem import border_of, problem_of
 from contfric.curves.ranges import box_of

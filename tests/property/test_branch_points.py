@@ -12,11 +12,11 @@ import contfric as cf
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.matching import on_branch
 from contfric.continuation.crossing import LOCATED, _ChainProblem, crossing_near
-from contfric.continuation.events import EndReason
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import MOST_POINTS, settings_of
-from contfric.continuation.side import first_point
 from contfric.continuation.switching import leave_along
 from contfric.continuation.vertex_ends import stalled_at
+from contfric.events.bifurcation import EndReason
 
 MODEL = Path(__file__).parents[1] / "models" / "crossing.yaml"
 #: The state z of the model obeys z' = mu z + q z^2 - c z^3 + e, whatever the oscillator does, and shifts

@@ -17,7 +17,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.matching import stops_distance
-from contfric.continuation.events import ACCURACY, EndReason
+from contfric.events.bifurcation import ACCURACY, EndReason
 from contfric.signature.holds import TOUCH, is_hold
 
 Scene = tuple[dict[str, float], str, tuple[float, float]]

@@ -15,7 +15,7 @@ from contfric.certify.chain import Chain, segments_of
 from contfric.certify.strand import Strand, in_phases
 from contfric.certify.tracing import Tracer
 from contfric.certify.tube import Box, box_between, solved
-from contfric.continuation.events import EndReason
+from contfric.events.bifurcation import EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working

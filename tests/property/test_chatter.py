@@ -18,11 +18,11 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import contfric as cf
-from contfric.continuation.events import EndReason
 from contfric.errors import ModelError, ParameterError
-from contfric.models.chatter import with_chatter
+from contfric.events.bifurcation import EndReason
 from contfric.models.check import check_model
-from contfric.orbit.simulation import SimulationEnd, go_on
+from contfric.models.shorthand.chatter import with_chatter
+from contfric.simulation.simulate import SimulationEnd, go_on
 
 BALL = """
 name: ball

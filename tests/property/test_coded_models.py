@@ -11,15 +11,15 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.build import load_module
-from contfric.models.coded import Forms, forms_of
-from contfric.models.coded_flow import CodedFlow
-from contfric.models.coefficients import AFFINE, Affine, symbols
 from contfric.models.describe import from_text
-from contfric.models.grammar import FLOATS, Scope, parse
-from contfric.models.not_affine import NotAffineError
-from contfric.orbit.simulation import simulate
-from contfric.orbit.tables import tables
+from contfric.models.generated.build import load_module
+from contfric.models.generated.formula_tables import Forms, forms_of
+from contfric.models.generated.table_flow import CodedFlow
+from contfric.models.language.coefficients import AFFINE, Affine, symbols
+from contfric.models.language.grammar import FLOATS, Scope, parse
+from contfric.models.language.not_affine import NotAffineError
+from contfric.simulation.simulate import simulate
+from contfric.simulation.tables import tables
 
 #: Affine models of all kinds: sliding, impacts, clocks in SI units, resets to another mode, relays.
 MODELS = (

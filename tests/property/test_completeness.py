@@ -16,9 +16,9 @@ from report import Tally
 
 import contfric as cf
 from contfric.atlas.verification import differences
-from contfric.continuation.conditions import possible, relation_of
-from contfric.continuation.incident import incident_forms
-from contfric.continuation.sequences import count, lengths, necklaces
+from contfric.events.conditions import possible, relation_of
+from contfric.events.incident import incident_forms
+from contfric.events.sequences import count, lengths, necklaces
 from contfric.orbit.index import index_at_infinity, index_of, opening_sign
 
 #: Of the first 66 scenes of seed 7: those that are cut at 60 branches, so that nothing is held against

@@ -20,11 +20,11 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
 from contfric.continuation.arms import arms_at
 from contfric.continuation.continuum import is_continuum
-from contfric.continuation.doubling_point import _LOCATED, Line, opening
+from contfric.continuation.located_event import ROUGH
 from contfric.continuation.moved_by_errors import duration_error
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import settings_of
-from contfric.continuation.report import ROUGH
+from contfric.events.doubling_point import _LOCATED, Line, opening
 from contfric.orbit.index import opening_sign
 
 #: Scenes by what was wrong with them.

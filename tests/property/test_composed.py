@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.base.arrays import FloatArray
 from contfric.errors import ModelError, ParameterError
-from contfric.models import structure as reading
 from contfric.models.check.probe import Probe
-from contfric.models.definition import FloatArray
+from contfric.models.structures import structure as reading
 from contfric.signature.holds import comes_to_rest, ends_rest, left_surface
 
 PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7}

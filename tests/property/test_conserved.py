@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.conserved import conserved, kept_by
 from contfric.models.evaluate import floats
-from contfric.orbit.conserved import conserved, kept_by
 from contfric.orbit.one_way import only_grows
-from contfric.orbit.simulation import Trajectory
 from contfric.signature import canonical_itinerary
+from contfric.simulation.simulate import Trajectory
 
 PARAMETERS = {"Omega": 0.9, "k": 1.0, "S1": 0.3, "S2": 1.5}
 FREE = {"c1": {"kind": "friction", "velocity": "v1", "kinetic": "S1"}}

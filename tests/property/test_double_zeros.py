@@ -11,7 +11,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.verification import STEP
-from contfric.orbit.system import Margin
+from contfric.bvp.system import Margin
 
 #: Scenes with a bridge after a touch of the limit inside of a stick: what varies, where, its parameters.
 SCENES = [

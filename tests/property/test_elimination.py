@@ -7,9 +7,9 @@ import restarts
 from numba import types
 
 import contfric as cf
+from contfric.base.arrays import FloatArray
+from contfric.bvp.cyclic import elimination_workspace, finish, next_rows, start_border, take_out
 from contfric.compiled import blocks, kernel, matrix
-from contfric.models.definition import FloatArray
-from contfric.orbit.cyclic import elimination_workspace, finish, next_rows, start_border, take_out
 
 
 @kernel(

@@ -15,8 +15,8 @@ import pytest
 import contfric as cf
 from contfric.atlas import matching
 from contfric.atlas.verification import differences
+from contfric.bvp.system import build_system
 from contfric.orbit.repetition import shortest
-from contfric.orbit.system import build_system
 from tests.property.test_fast_cycles import welander
 
 MCKEAN = """

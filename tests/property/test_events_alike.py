@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from contfric.atlas.degenerate import _ALIKE, _alike
-from contfric.continuation.sequences import necklaces
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
+from contfric.events.sequences import necklaces
 from contfric.orbit.slides import Outline
 
 CYCLE = 7.0

@@ -11,7 +11,7 @@ import pytest
 import restarts
 
 import contfric as cf
-from contfric.continuation.events import Kind
+from contfric.events.bifurcation import Kind
 
 SCENE = restarts.scene(51, 155)
 BOUNDS = (0.03, 0.18)

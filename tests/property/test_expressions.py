@@ -13,14 +13,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from contfric.errors import ModelError
-from contfric.models.build import load_module
 from contfric.models.check.derivatives import MANY_DIGITS, slopes
-from contfric.models.code import printed
 from contfric.models.describe import describe
-from contfric.models.formulas import FORMULAS, formula, kinks_in, vanishes
-from contfric.models.grammar import FLOATS, Scope, names_in, number_of, parse
+from contfric.models.generated.build import load_module
+from contfric.models.generated.code import printed
+from contfric.models.generated.symbols import Formulas
+from contfric.models.language.formulas import FORMULAS, formula, kinks_in, vanishes
+from contfric.models.language.grammar import FLOATS, Scope, names_in, number_of, parse
 from contfric.models.oscillator import Symbols
-from contfric.models.symbols import Formulas
 
 NAMES = ("x", "v", "t", "a", "b")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.starts import displaced, start_of
+from contfric.simulation.starts import displaced, start_of
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Samples of a period, and what they may miss of an extremum: acceleration times the square of their spacing.

@@ -16,9 +16,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, minimize_scalar
 
-from contfric.flow.forced_oscillator import flow, hit, observe
-from contfric.flow.forced_oscillator import stationary as kernel
-from contfric.flow.roots import AT_STATIONARY
+from contfric.flow.oscillator.flow import flow, hit, observe
+from contfric.flow.oscillator.flow import stationary as kernel
+from contfric.flow.oscillator.roots import AT_STATIONARY
 
 LOAD, SPEED = range(2)
 STICK = 2

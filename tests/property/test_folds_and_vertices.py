@@ -14,17 +14,18 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
 from contfric.base.tally import tally
-from contfric.continuation import kinds, smooth
-from contfric.continuation.doubling_point import moved, opening, refined_opening
+from contfric.bvp.system import Margin
+from contfric.continuation import smooth
 from contfric.continuation.folds import _is_idle
+from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, settings_of
-from contfric.continuation.side import first_point
 from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
 from contfric.continuation.trace import trace_side
 from contfric.continuation.vertex_ends import left_at
 from contfric.continuation.vertices import passed_vertex
-from contfric.orbit.simulation import tables
-from contfric.orbit.system import Margin
+from contfric.events import sliding_kinds as kinds
+from contfric.events.doubling_point import moved, opening, refined_opening
+from contfric.simulation.simulate import tables
 
 FIG05 = {"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.0}
 #: The branch point of 2s (docs/numerics.md, 40 digits).

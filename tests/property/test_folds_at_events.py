@@ -13,9 +13,10 @@ import pytest
 import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
-from contfric.continuation import resolve, smooth
-from contfric.continuation.events import Kind
+from contfric.continuation import events_of_step as resolve
+from contfric.continuation import smooth
 from contfric.continuation.points import LARGEST_STEP
+from contfric.events.bifurcation import Kind
 
 RANGE = (-0.39, -0.15)
 

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 import contfric as cf
-from contfric.continuation.gradients import gradient_of
-from contfric.models.definition import FloatArray
-from contfric.orbit.system import Margin
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Margin
+from contfric.events.gradients import gradient_of
 
 WALLS = """
 name: two-walls

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.events import Kind
+from contfric.events.bifurcation import Kind
 
 DOUBLE = """
 name: double

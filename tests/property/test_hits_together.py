@@ -10,8 +10,8 @@ from mpmath import mp
 import contfric as cf
 from contfric.chaos.rows import FollowingLimits, follow
 from contfric.compiling.lanes import LANES, read, write
-from contfric.flow.sines import sine_cosine
-from contfric.flow.together import together
+from contfric.flow.oscillator.sines import sine_cosine
+from contfric.flow.oscillator.together import together
 from contfric.flow.without import SINGLY
 from contfric.models import load_model
 

@@ -11,11 +11,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.continuation.unit import form_of, pieces, unit_of
+from contfric.bvp.linear import assembled, jacobian_blocks, tangent_of
 from contfric.continuation.vertices import passed_vertex
 from contfric.errors import NotationError
+from contfric.events.unit import form_of, pieces, unit_of
 from contfric.models import load_model
-from contfric.orbit.linear import assembled, jacobian_blocks, tangent_of
 from contfric.orbit.samples import state_within
 from contfric.signature import (
     canonical_itinerary,
@@ -208,7 +208,7 @@ def bridges() -> list[cf.Branch]:
 
 def residuals(orbit: cf.Orbit, joints: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """The equations as the engine has them (its right-hand side is minus the residual)."""
-    from contfric.orbit.blocks import linearise
+    from contfric.bvp.blocks import linearise
 
     count, m = joints.shape
     workspace = np.empty((count, m, m)), np.empty((count, m, m)), np.empty((count, m, len(vector)))

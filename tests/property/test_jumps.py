@@ -10,7 +10,7 @@ import pytest
 
 import contfric as cf
 from contfric.orbit.solve import refine
-from contfric.orbit.starts import signs_at
+from contfric.simulation.starts import signs_at
 
 #: For each kind a scene in which a stable regular branch ends at it.
 SCENES = {

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from typed import typed
 
 import contfric as cf
-from contfric.continuation.events import Kind
+from contfric.events.bifurcation import Kind
 
 KICK = """
 name: kick

@@ -9,12 +9,12 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
+from contfric.bvp.margins import Margin
 from contfric.continuation.branch import Branch
-from contfric.continuation.conditions import Relation, possible, relation_of
-from contfric.continuation.events import Kind
-from contfric.continuation.incident import incident_forms, vanishing
-from contfric.continuation.locations import normal_location
-from contfric.orbit.margins import Margin
+from contfric.events.bifurcation import Kind
+from contfric.events.conditions import Relation, possible, relation_of
+from contfric.events.incident import incident_forms, vanishing
+from contfric.events.locations import normal_location
 
 #: In diagrams near this one, in zeta, a hold can just not be left inside any more.
 HELD = {"Omega": 0.12784, "S": 0.020946, "S0": 0.046345, "h": 0.04157, "zeta": 0.00483}

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.simulation import SimulationEnd
+from contfric.simulation.simulate import SimulationEnd
 
 PERIODS = 4
 #: Errors of locations (1e-15) grow by the stiffest contact over some stops: far above that, far below an

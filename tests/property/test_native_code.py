@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import contfric as cf
 from contfric.base.checked import write_sealed
 from contfric.compiled import f8, i8, matrix, types, vector
-from contfric.models.build import GeneratedFlow, coded_flow, load_module
-from contfric.models.unit import Formula, GeneratedUnit
+from contfric.models.generated.build import GeneratedFlow, coded_flow, load_module
+from contfric.models.generated.unit import Formula, GeneratedUnit
 
 MODELS = Path(__file__).parents[1] / "models"
 #: Numbers of each kind that no function of a model has more of.
@@ -178,4 +178,4 @@ def test_functions_of_models_are_what_python_makes_of_them(monkeypatch):
                 tried += 1
         monkeypatch.undo()
     assert tried > 300
-    assert "contfric.models.native" in sys.modules
+    assert "contfric.models.generated.native" in sys.modules

@@ -15,7 +15,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.flow.forced_oscillator import flow, hit, stationary
+from contfric.flow.oscillator.flow import flow, hit, stationary
 
 LOAD, SPEED = range(2)
 NONE, NOTHING = np.empty(0, dtype=np.int64), np.empty((0, 0))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.dips import cubic_dip, mean_dip
+from contfric.continuation.core.dips import cubic_dip, mean_dip
 
 #: Random scenes of which branches are traced, and those in which curves are.
 SCENES, PLANES = 300, 110

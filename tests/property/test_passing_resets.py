@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from typed import typed
 
 import contfric as cf
-from contfric.orbit.simulation import SimulationEnd
+from contfric.simulation.simulate import SimulationEnd
 
 #: Quarters of the plane by the sides of the gate and of v = 0.
 _QUARTERS = tuple(product("+-", repeat=2))

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.accuracy import off_circle
 from contfric.continuation.vertices import symmetric_part
 from contfric.orbit.solve import refine
-from contfric.orbit.system import EventFunction, Margin
 from contfric.signature.holds import TOUCH
 
 Scene = tuple[dict[str, float], str, tuple[float, float]]
@@ -245,7 +245,7 @@ def test_what_is_solved_is_determined(seed: int) -> None:
     found = diagram(seed)
     if found is None:
         pytest.skip("nothing periodic attracts there")
-    from contfric.orbit.linear import assembled
+    from contfric.bvp.linear import assembled
 
     for branch in found.branches[:8]:
         orbit = refine(branch[len(branch) // 2], damped=False)

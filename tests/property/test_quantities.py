@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
+from contfric.bvp.linear import jacobian_blocks, stacked
 from contfric.errors import ContfricError
 from contfric.orbit.gradient import by_parameters, joint_sensitivities
-from contfric.orbit.linear import jacobian_blocks, stacked
 from contfric.orbit.solve import refine
 from contfric.quantities import functionals
 from contfric.quantities.motion import OrbitMotion

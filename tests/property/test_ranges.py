@@ -13,7 +13,7 @@ import contfric as cf
 from contfric.errors import ModelError
 from contfric.models.check import Severity
 from contfric.models.describe import describe, from_text
-from contfric.models.symbols import Formulas
+from contfric.models.generated.symbols import Formulas
 
 #: Pulse vaccination: between pulses the infectives fall by ten orders of magnitude and more.
 EPIDEMIC = """

@@ -9,7 +9,8 @@ import pytest
 from two_masses import stuck_next_to_a_gap
 
 import contfric as cf
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 
 

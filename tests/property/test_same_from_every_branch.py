@@ -11,11 +11,11 @@ import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation import smooth
-from contfric.continuation.events import Kind
 from contfric.continuation.folds import fold_at
-from contfric.continuation.incident import Name, kinds_between
+from contfric.continuation.half_branch import point_before
 from contfric.continuation.points import LARGEST_STEP
-from contfric.continuation.side import point_before
+from contfric.events.bifurcation import Kind
+from contfric.events.incident import Name, kinds_between
 
 #: A bridge turns over 1e-8 of its range.
 FOLD = {"Omega": 0.07742262128103025, "S0": 0.13762082006748685, "h": 0.0, "zeta": 1e-9}

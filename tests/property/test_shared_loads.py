@@ -11,7 +11,7 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.complementarity import ContactsAtRest
+from contfric.models.structures.complementarity import ContactsAtRest
 
 
 def rest_of(rng: np.random.Generator, ratio: float) -> ContactsAtRest:

@@ -11,9 +11,9 @@ import pytest
 import contfric as cf
 from contfric.atlas.matching import guesses
 from contfric.atlas.shared_rests import SharedRest, shared_rest
+from contfric.bvp.system import build_system
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
-from contfric.orbit.system import build_system
 
 #: Its stick at a maximum of the load (x = 0.913120818) is passed by orbits with holds over most of the range.
 SCENE = {

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.events import ACCURACY
-from contfric.continuation.incident import incident_forms
-from contfric.continuation.zero_acceleration import only_comes_back
-from contfric.orbit.system import inside_sign
+from contfric.bvp.system import inside_sign
+from contfric.events.bifurcation import ACCURACY
+from contfric.events.incident import incident_forms
+from contfric.events.zero_acceleration import only_comes_back
 
 SAMPLES = 2001
 

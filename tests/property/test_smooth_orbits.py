@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric.models.chatter import with_chatter
+from contfric.models.shorthand.chatter import with_chatter
 
 MODELS = Path(__file__).parents[1] / "models"
 RANDOM = np.random.default_rng(13)

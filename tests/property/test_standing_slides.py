@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.events import ACCURACY
-from contfric.continuation.standing_slides import goes_nowhere
+from contfric.events.bifurcation import ACCURACY
+from contfric.events.standing_slides import goes_nowhere
 
 NEAR = {
     "k": 5.41325782573,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.linear import null_rows
 from contfric.models.view import FlowView
-from contfric.orbit.linear import null_rows
 
 
 def light_tip(seed: int) -> tuple[cf.Model, np.ndarray, float]:

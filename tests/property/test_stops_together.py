@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.simulation import SimulationEnd
+from contfric.simulation.simulate import SimulationEnd
 
 #: Periods that are compared, and the step. Stops and slips are told a step late: the error is of that order,
 #: times the few units of time over which it grows.

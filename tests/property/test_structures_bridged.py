@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.candidates import candidates
-from contfric.orbit.linear import equations_at
+from contfric.bvp.linear import equations_at
+from contfric.events.candidates import candidates
 
 PARAMETERS = {"w": 0.667, "F": 0.5, "k": 1.0, "c": 0.05, "vd": 0.6, "S": 0.25, "S0": 0.35, "d": 0.9}
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import build_system
 from contfric.certify.chain import segments_of
 from contfric.certify.closing import is_symmetry, keeps
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
-from contfric.orbit.system import build_system
 
 FREE = """
 name: {name}

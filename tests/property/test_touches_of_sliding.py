@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.system import Margin
 from contfric.continuation.accuracy import _gradient, _margin
-from contfric.continuation.events import ACCURACY
-from contfric.orbit.system import Margin
+from contfric.events.bifurcation import ACCURACY
 
 ABOUT = {
     "zeta": 0.0481491523,

@@ -9,7 +9,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.matching import inner_orbit, on_branch
-from contfric.orbit.conserved import conserved
+from contfric.bvp.conserved import conserved
 from contfric.orbit.one_way import only_grows
 
 MASSES, CONTACTS = 6, 5

@@ -3,7 +3,8 @@
 A model of many modes has its matrices as data. The formulas of its parameters are a list of operations
 (:mod:`contfric.flow.coded.operations`); a coefficient is a sum of their results times weights; a row of an
 affine form lists its coefficients of states and of harmonics. Forms come in *groups*: the rates of a piece
-(n rows), an observable (one row), a reset (n rows). What :class:`contfric.models.coded.Tables` writes::
+(n rows), an observable (one row), a reset (n rows). What
+:class:`contfric.models.generated.formula_tables.Tables` writes::
 
     operations[4 v : 4 v + 4]  kind, and up to three operands;  numbers[v] its constant
     row_of[g]                  first row of a group;  slope_at[r], wave_at[r] its first slope, and wave

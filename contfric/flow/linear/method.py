@@ -1,12 +1,12 @@
 """The closed form as a method of the integrator, for what its own search does not know.
 
 An observable that is not affine, and a motion through kinks, are searched step by step as along an integrated
-motion (:mod:`contfric.flow.stepping`); the steps of an affine mode are then its closed form. They have no
-error; their length is limited so that the certificates of the search hold. These bound the error of the
-quintic between the ends of a step (:mod:`contfric.flow.panels`), which is true of steps that resolve the
-observable, ``w h <= 2``. How fast an observable such as sin(theta) changes does not follow from the rates of
-the states: it is compared with the quintic inside of the step. The quotient of error and bound falls with the
-square of the length.
+motion (:mod:`contfric.flow.integration.stepping`); the steps of an affine mode are then its closed form.
+They have no error; their length is limited so that the certificates of the search hold. These bound the
+error of the quintic between the ends of a step (:mod:`contfric.flow.integration.panels`), which is true of
+steps that resolve the observable, ``w h <= 2``. How fast an observable such as sin(theta) changes does not
+follow from the rates of the states: it is compared with the quintic inside of the step. The quotient of
+error and bound falls with the square of the length.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.compiled import allocating_helper, helper
-from contfric.flow.dense import node
-from contfric.flow.dop853 import POWER
+from contfric.flow.integration.dense import node
+from contfric.flow.integration.dop853 import POWER
+from contfric.flow.integration.panels import error_of
+from contfric.flow.integration.stepping import explicit, explicit_probe
 from contfric.flow.linear.flow import MOST_STEPS
 from contfric.flow.linear.steps import advance, exponential
 from contfric.flow.linear.system import REACH, WAVES, rows_of, set_up, silenced, system_in
-from contfric.flow.panels import error_of
 from contfric.flow.pieces import coefficients as quintic
 from contfric.flow.pieces import left_part
-from contfric.flow.stepping import explicit, explicit_probe
 
 #: Where an observable is compared within a step: at no place that is symmetric to another.
 _INSIDE = (0.21, 0.5, 0.68)

@@ -1,9 +1,9 @@
 """The system of an affine mode at some parameters, in a workspace that is allocated once a call.
 
 With the cosines and sines of all frequencies as further states the system is linear and autonomous. Its
-coefficients (:mod:`contfric.models.linear_code`) are evaluated once a call; the *rate* of the system, a bound
-of how fast its Taylor terms grow, follows from a norm of the matrix in units of the states that make it small
-(Osborne's iteration) and from the frequencies whose factors are not zero.
+coefficients (:mod:`contfric.models.generated.linear_code`) are evaluated once a call; the *rate* of the
+system, a bound of how fast its Taylor terms grow, follows from a norm of the matrix in units of the states
+that make it small (Osborne's iteration) and from the frequencies whose factors are not zero.
 
 A sweep changes all units at once: each by the fourth root of the ratio of its row to its column. By the
 square root, as where one unit is changed at a time, both units of a pair such as a position and its velocity

@@ -1,8 +1,8 @@
 """Models that are declared by their equations, as matrices in balls.
 
-A mode is affine if its formulas are (:mod:`contfric.models.affine`). The frequencies of all formulas are the
-harmonics of the extended state. That the period is one of the formulas is no statement of the author:
-``w T / (2 pi)`` must be a whole number, for every frequency w, identically in the parameters.
+A mode is affine if its formulas are (:mod:`contfric.models.generated.affine`). The frequencies of all
+formulas are the harmonics of the extended state. That the period is one of the formulas is no statement of
+the author: ``w T / (2 pi)`` must be a whole number, for every frequency w, identically in the parameters.
 
 Numbers in formulas are taken as they are stored: a decimal of a model's file is the binary number next to it.
 """
@@ -18,16 +18,16 @@ import sympy
 from flint import arb, arb_mat
 
 from contfric.errors import ParameterError
-from contfric.models.affine import AffineForm
 from contfric.models.balls.identities import alike, mirrored, moved
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import zeros
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
 from contfric.models.description import Description
+from contfric.models.generated.affine import AffineForm
+from contfric.models.generated.symbols import Formulas
 from contfric.models.parts import Observable
-from contfric.models.structure_modes import composition_of
-from contfric.models.symbols import Formulas
+from contfric.models.structures.visited_modes import composition_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
-from contfric.models.definition import Domain, FloatArray, Reset
+from contfric.models.definition import Domain, Reset
 from contfric.models.describe import from_text
 
 #: States that are tried, those of each mode from which lines are followed, and samples of a line.
@@ -98,8 +99,8 @@ def _may_jump(probe: Probe) -> list[str]:
     """Return the surfaces whose observables are not made of continuous functions."""
     if not probe.model.definition:
         return [s.name for s in probe.model.surfaces]
-    from contfric.models.formulas import cannot_jump
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.formulas import cannot_jump
 
     formulas = Formulas(from_text(probe.model.definition))
     moving = (formulas.t, *formulas.y)
@@ -216,8 +217,8 @@ def _continuous_resets(probe: Probe) -> set[str]:
     """Return the surfaces whose resets are made of continuous functions: nothing has to be tried there."""
     if not probe.model.definition:
         return set()
-    from contfric.models.formulas import cannot_jump
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.formulas import cannot_jump
 
     formulas = Formulas(from_text(probe.model.definition))
     moving = (formulas.t, *formulas.y)

@@ -16,15 +16,16 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.models.build import field_of
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 from contfric.models.describe import from_text
 from contfric.models.description import Description
 from contfric.models.evaluate import Evaluator
-from contfric.models.grammar import UNARY, Algebra
+from contfric.models.generated.build import field_of
+from contfric.models.language.grammar import UNARY, Algebra
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5

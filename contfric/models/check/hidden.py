@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import FloatArray, Model
+from contfric.models.definition import Model
 
 #: States in each mode, and draws of states in which they are looked for: what holds at six random states
 #: holds almost everywhere.

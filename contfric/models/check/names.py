@@ -7,7 +7,7 @@ from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Model
 from contfric.models.describe import from_text
-from contfric.models.grammar import parse
+from contfric.models.language.grammar import parse
 
 #: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
 _STARTS = 40
@@ -70,7 +70,7 @@ def check_names(report: ModelReport, model: Model) -> None:
 def _mentions(data: object, name: str) -> bool:
     """Return whether any expression of a description, other than its own, has a name in it."""
     from contfric.errors import ModelError
-    from contfric.models.grammar import names_in
+    from contfric.models.language.grammar import names_in
 
     if isinstance(data, dict):
         return any(_mentions(v, name) for k, v in data.items() if k not in ("title", "references"))
@@ -90,8 +90,8 @@ def check_kinks(report: ModelReport, model: Model) -> None:
         return
     from sympy import Symbol
 
-    from contfric.models.formulas import kinks_in
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.formulas import kinks_in
 
     formulas = Formulas(from_text(model.definition))
     symbols = (*formulas.y, *formulas.p)
@@ -122,8 +122,8 @@ def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
         return
     from sympy import Symbol, lambdify
 
-    from contfric.models.formulas import kinks_in
-    from contfric.models.symbols import Formulas
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.formulas import kinks_in
 
     formulas = Formulas(from_text(model.definition))
     symbols = (formulas.t, *formulas.y, *formulas.p)

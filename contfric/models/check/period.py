@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from contfric.base.arrays import FloatArray
 from contfric.models.check.probe import Probe
-from contfric.models.definition import FloatArray
 
 #: Rounding of a field, and of the phase after a period, relative to 1 + the values.
 _SAME = 1e-8

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from contfric.models.definition import FloatArray, Model
+from contfric.base.arrays import FloatArray
+from contfric.models.definition import Model
 from contfric.models.view import FlowView
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
@@ -88,7 +89,7 @@ class Probe:
         """Return the rates of all states in a mode."""
         n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
-            from contfric.models.build import field_of
+            from contfric.models.generated.build import field_of
 
             out, field = np.empty(n), field_of(self.model)
             m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)

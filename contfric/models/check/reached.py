@@ -16,7 +16,7 @@ from contfric.models.check.probe import FEW_MODES, Probe
 from contfric.models.check.report import ModelReport, Topic
 
 if TYPE_CHECKING:
-    from contfric.orbit.simulation import Trajectory
+    from contfric.simulation.simulate import Trajectory
 
 #: Simulations: one from the start by default, and from states that are drawn in the region.
 _STARTS = 12
@@ -95,7 +95,7 @@ def _unvisited(probe: Probe) -> set[str]:
 @lru_cache(maxsize=1)  # the same simulations for every fault of a model
 def _ends(probe: Probe) -> tuple[bool, ...]:
     """Return of each simulation whether it came to where motion cannot go on; nothing if none could start."""
-    from contfric.orbit.simulation import SimulationEnd
+    from contfric.simulation.simulate import SimulationEnd
 
     return tuple(
         motion.end is SimulationEnd.IMPOSSIBLE or _is_outside(probe, motion)
@@ -106,7 +106,7 @@ def _ends(probe: Probe) -> tuple[bool, ...]:
 @lru_cache(maxsize=1)
 def _motions(probe: Probe) -> tuple[Trajectory, ...]:
     """Return simulations from the start by default, and from states that are drawn."""
-    from contfric.orbit.simulation import simulate
+    from contfric.simulation.simulate import simulate
 
     model, draw = probe.model, np.random.default_rng(probe.seed)
     low, high = model.region(probe.vector)

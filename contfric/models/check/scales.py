@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.clocks import is_clock
+from contfric.models.shorthand.clocks import is_clock
 
 #: Sizes of states, or times in which they change, that are this far apart: Newton's method and distances in
 #: a diagram weigh all states alike.

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
+from contfric.base.arrays import FloatArray
 from contfric.models.check.passages import check_left, crossed_limits, other_side
 from contfric.models.check.period import changed_after_a_period, not_periodic, undeclared_angles
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, FloatArray, Model, Reset, Surface
+from contfric.models.definition import Domain, Model, Reset, Surface
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400

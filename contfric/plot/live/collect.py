@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.definition import FloatArray
+from contfric.base.arrays import FloatArray
 from contfric.plot.events import Mark, marks_of
 from contfric.plot.runs import quantity, stability_runs
 from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
@@ -22,7 +22,7 @@ from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colo
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Bifurcation
+    from contfric.events.bifurcation import Bifurcation
     from contfric.orbit.orbit import Orbit
 
 #: Samples of an orbit: a curve of this many pieces looks smooth at the size that it has on the page.

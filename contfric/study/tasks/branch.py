@@ -54,7 +54,7 @@ def one_branch(branch: Branch, bounds: tuple[float, float]) -> Diagram:
     """Return the diagram of a single branch: nothing follows its events."""
     from contfric.atlas.collect import FINAL
     from contfric.atlas.diagram import Diagram, LooseEnd, Node
-    from contfric.continuation.events import EndReason
+    from contfric.events.bifurcation import EndReason
 
     return Diagram(
         model=branch.model,

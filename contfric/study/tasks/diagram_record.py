@@ -10,7 +10,7 @@ from contfric.base.shown import aligned
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
     from contfric.continuation.branch import Branch
-    from contfric.continuation.events import Proposal
+    from contfric.events.bifurcation import Proposal
 
 Record: TypeAlias = dict[str, Any]
 

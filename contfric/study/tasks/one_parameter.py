@@ -28,7 +28,10 @@ BIFURCATIONS = "bifurcations.csv"
 #: Rows of a diagram that show a state, which an equilibrium has, too.
 _STATES = frozenset({"x_max", "x_min", "stops"})
 #: Kernels of the continuation; those that find an orbit are compiled meanwhile.
-_CONTINUATION = ("contfric.continuation.march:march", "contfric.continuation.bracket:locate")
+_CONTINUATION = (
+    "contfric.continuation.core.march:march",
+    "contfric.continuation.core.locate:locate",
+)
 
 
 class OneParameter(AlongParameter):
@@ -77,7 +80,7 @@ class OneParameter(AlongParameter):
 
     def cut_short(self, found: Diagram) -> bool:
         """Tell whether Ctrl-C ended it (a limit such as ``max_branches`` does not count)."""
-        from contfric.continuation.events import EndReason
+        from contfric.events.bifurcation import EndReason
 
         ends = (end.reason for branch in found.branches for end in branch.ends)
         return EndReason.INTERRUPTED.value in found.notes or EndReason.INTERRUPTED in ends

@@ -60,8 +60,8 @@ class PlaneTask(Task):
 
     def check(self, asked: StudyCheck) -> None:
         """Check ranges, sections and kinds."""
-        from contfric.continuation.events import Kind
         from contfric.curves.ranges import box_of
+        from contfric.events.bifurcation import Kind
 
         one, other = self.parameters
         ranges = asked.check_ranges(self.name, self.range)
@@ -110,7 +110,7 @@ class PlaneTask(Task):
 
     def cut_short(self, found: Plane) -> bool:
         """Tell whether Ctrl-C ended it (a limit does not count)."""
-        from contfric.continuation.events import EndReason
+        from contfric.events.bifurcation import EndReason
 
         return EndReason.INTERRUPTED.value in found.notes
 

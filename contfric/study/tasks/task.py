@@ -18,8 +18,9 @@ from contfric.base.yaml_schema import SchemaPart, keys_of, whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from contfric.base.arrays import FloatArray
     from contfric.base.yaml_lines import Address, LocatedYaml
-    from contfric.models.definition import FloatArray, Model
+    from contfric.models.definition import Model
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
     from contfric.study.schema import StudyFile

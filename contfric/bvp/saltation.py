@@ -1,0 +1,107 @@
+"""Saltation matrices that are finite although the rate of the exit vanishes.
+
+After a joint at which the field jumps, a disturbance is multiplied by the saltation matrix, with the rate
+of the exit as divisor [1]_. Where a surface is only touched that rate is 0, and a segment after it has no
+length. Two kinds of joints have a limit there, in which the rate does not stand:
+
+* the field is continuous (a contact with a spring; a slider that comes to rest; a section): the identity;
+* motion begins to slide on the surface h = 0, and the field changes along one direction e only (a slider
+  that begins to slip; friction that begins to stick): the projection ``1 - e h_y / (h_y . e)``.
+
+The rows of such an exit would divide zero by zero. They are replaced: the joint is passed when it was.
+Without excitation the last joint fixes the phase, and what is passed is a plane normal to the field.
+
+.. [1] R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer
+   (2004), chapter 7.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import islice
+
+import numpy as np
+
+from contfric.base.arrays import FloatArray
+from contfric.bvp.passages import Passage, fields_between, passage_at
+from contfric.bvp.system import Itinerary, System, following_modes
+from contfric.models.definition import Model
+from contfric.models.view import FlowView
+from contfric.signature.holds import is_hold
+
+#: States at which the direction is asked for where it is known to be one: it is taken where the change is
+#: largest, and vanishes at all of these by no accident.
+_FEW = 4
+#: A rate at an exit below this share of an ordinary one counts as small: rows of the exit that divide by it
+#: lose as many digits, twice: twelve are left.
+_SMALL = 1e-2
+
+
+def pass_when_due(
+    system: System, joints: FloatArray, vector: FloatArray, a: FloatArray, b: FloatArray
+) -> None:
+    """Replace the rows of joints at which the rate of the exit does not matter, in the blocks of a turn.
+
+    Parameters
+    ----------
+    a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
+    """
+    model, itinerary = system.model, system.itinerary
+    due = _due(model, itinerary, system.half)
+    if not due:
+        return
+    view = FlowView(model, vector)
+    for i, passage, following in due:
+        mode, exit_ = itinerary[i]
+        last = i + 1 == len(itinerary)
+        end = _end(system, joints, view, i)
+        slope = view.gradient(model.surface_by_name[exit_].observable, *end)
+        if not _is_small(slope, b[i, :-1, 0]):
+            continue
+        if passage is Passage.PROJECTED:
+            project = _projection(view, slope[1:], (mode, exit_, following))
+            a[i, :-1], b[i, :-1, 0] = project @ a[i, :-1], project @ b[i, :-1, 0]
+        a[i, -1], b[i, -1] = 0.0, 0.0
+        if not model.autonomous:
+            b[i, -1, 0] = 1.0
+        elif last:  # the column of the time at the end of a flow is the field there
+            field = b[i, :-1, 0]
+            b[i, -1, 1:] = field / (np.linalg.norm(field) or 1.0)
+        else:
+            a[i, -1, 0], b[i, -1, 0] = -1.0, 1.0
+
+
+@cache
+def _due(model: Model, itinerary: Itinerary, half: bool) -> list[tuple[int, Passage, str]]:
+    """Return the joints at which the rate may vanish, with what the field does there and what follows."""
+    after = following_modes(model, itinerary, half)
+    found: list[tuple[int, Passage, str]] = []
+    for i, ((mode, exit_), following) in enumerate(zip(itinerary, after, strict=True)):
+        passage = passage_at(model, mode, exit_, following)
+        held = is_hold(
+            itinerary[(i + 1) % len(itinerary)][1]
+        )  # what is held has equations of its own
+        if passage is not Passage.JUMP and not held:
+            found.append((i, passage, following))
+    return found
+
+
+def _end(system: System, joints: FloatArray, view: FlowView, i: int) -> tuple[float, FloatArray]:
+    """Return time and state at the end of segment i: that of the last is the image of the first joint."""
+    if i + 1 < len(joints):
+        return float(joints[i + 1, 0]), joints[i + 1, 1:]
+    layout = system.layout
+    return float(joints[0, 0]) + layout.turn * view.period, layout.closure @ joints[0, 1:]
+
+
+def _is_small(slope: FloatArray, field: FloatArray) -> bool:
+    rate = slope[0] + slope[1:] @ field
+    return bool(rate * rate < _SMALL**2 * (slope @ slope) * (1.0 + field @ field))
+
+
+def _projection(view: FlowView, slope: FloatArray, joint: tuple[str, str, str]) -> FloatArray:
+    """Return the map of disturbances where sliding begins; e is that of the state at which it is largest."""
+    found = islice(fields_between(view, *joint), _FEW)
+    changes = [there - here for here, there, _ in found]
+    along = max(changes, key=lambda change: float(np.linalg.norm(change)))
+    return np.eye(len(slope)) - np.outer(along, slope) / (slope @ along)

@@ -1,0 +1,1 @@
+"""The core of branches and curves, compiled: predictor, corrector, step control, brackets, location."""

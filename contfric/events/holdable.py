@@ -1,0 +1,54 @@
+"""Whether rest can be held at an event: where it would be left with an acceleration, inside its region."""
+
+from __future__ import annotations
+
+from contfric.base.arrays import FloatArray
+from contfric.errors import NotationError
+from contfric.events.zero_acceleration import leaving_rate
+from contfric.orbit.orbit import Orbit
+from contfric.simulation.starts import signs_at
+
+#: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
+#: region (nondimensional), has no jump: far above rounding, far below any difference of two limits.
+NO_JUMP = 1e-9
+
+
+class NoJump(NotationError):
+    """Nothing can be held at an event: the solution there is continuous."""
+
+
+def check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
+    """Check that rest would be left with an acceleration: only then can it be held."""
+    jumps = not orbit.model.filippov  # else a rate is rounding, however large
+    if departs is not None and not (jumps and leaving_rate(orbit, rest, departs, joint) > NO_JUMP):
+        raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
+
+
+def check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
+    """Check that a state lies inside the region of a rest, not on its boundary.
+
+    A surface on which the state lies does not bound it where both of its sides are of the rest: where a mass
+    rests that a gap ends at, the rate of that gap is zero.
+    """
+    model = orbit.model
+    location = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
+    own = [domain.signs for domain in model.domains_of(rest)]
+    for signs in own:
+        sides = {s: sign for s, sign in signs.items() if sign != 0}
+        met = [s for s in sides if location[s] == 0]
+        inside = all(location[s] in (side, 0) for s, side in sides.items())
+        if inside and all({**signs, s: -sides[s]} in own for s in met):
+            return
+    raise NoJump(f"'{rest}' begins on the boundary of its region: nothing can be held there")
+
+
+def rest_mode(orbit: Orbit, i: int, surface: str) -> str:
+    """Return the mode of rest on a surface that a slide comes to at its end, or at a touch of it."""
+    model = orbit.model
+    for domain in model.domains_of(model.whole_mode(orbit.itinerary[i][0])):
+        for through, target in model.exits_of(domain.name):
+            rest = model.domain_by_name[target].mode
+            if through == surface and model.lies_on(rest, surface):
+                return rest
+    mode = orbit.itinerary[i][0]
+    raise NoJump(f"mode '{mode}' of model '{model.name}' never comes to rest on {surface}")

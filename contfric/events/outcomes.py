@@ -1,0 +1,394 @@
+"""What can follow a sliding event at one location of an orbit: the edit of its itinerary, and why.
+
+The solution at the event is known, so the local structure of each outcome can be derived from it
+(``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
+
+=====================================  ========================================================
+event, at the location                 outcome
+=====================================  ========================================================
+CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
+SS, followed by a reversal             insert a hold of length zero, pinned to F
+SS, followed by a stick                the stick becomes a hold pinned to F
+GS, an impact is grazed inside         split it there: an impact of speed zero
+GS, an impact has no speed any more    drop it: the segment goes on
+AS, a stick is released tangentially   insert a hold of length zero after it
+AS, a stick touches F inside           split it there: a hold goes on
+GS, a slide touches rest inside        split it there: insert a hold of length zero
+the same, and nothing jumps            split it there: insert a stick of length zero
+GS, a slide stops tangentially         the stick after it becomes a hold
+a hold has no length any more          drop it: the regular orbit with the earlier outcome
+a hold reaches its regular release     it becomes a stick: the regular orbit with the later outcome
+a hold is left without acceleration    the slide after it is gone: the stick after that takes over
+a hold touches F on its way            its pin moves to the touch
+the stick up to that touch vanishes    the hold is pinned to the stop
+a hold can just not be left inside     split it there: a slide and a second hold
+=====================================  ========================================================
+
+Where a stick becomes a hold, the hold lasts to the release, unless before that it cannot be left any
+more: there it ends, with a slide of length zero, and the rest of the stick follows.
+
+Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
+of Filippov): rest whose load touches its limit slips there for no time, and a slide that touches rest sticks
+there for no time (:mod:`contfric.events.standing_slides`). Where nothing else is known,
+:mod:`contfric.events.from_simulation` lets the flow itself say what follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import EventFunction, Margin
+from contfric.errors import NotationError
+from contfric.events import standing_slides as slides
+from contfric.events.bifurcation import Kind
+from contfric.events.contact_outcomes import continuous_edit
+from contfric.events.holdable import NoJump, check_held, check_inside, rest_mode
+from contfric.events.touching import chosen_at, crossed_at, entered_at, thrown_at
+from contfric.events.zero_acceleration import (
+    first_zero_acceleration,
+    touch_of,
+    touches_again,
+)
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit
+from contfric.orbit.section_joints import crossed_at_graze
+from contfric.orbit.slides import time_unit
+from contfric.signature.edits import Edit, drop, insert, split, swap_edit
+from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
+
+#: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
+NO_LENGTH = 1e-6
+#: The same for a hold at a touch of rest, which is left with an acceleration that grows from zero: what it
+#: does to the orbit is the square of its length, so that it is located to the root.
+NO_LENGTH_AT_TOUCH = 1e-4
+#: A slide between two holds vanishes with a double zero: it is located to the root of that.
+NEARLY_NO_LENGTH = 1e-3
+
+#: A slide of length zero appears where the acceleration a that a rest is left with falls through zero,
+#: ``a = -k t``: it lasts from -d/2 to d/2, as ``v = k (d^2/4 - t^2) / 2`` vanishes there.
+_APPEARS = (-0.5, 0.5)
+#: Where a has a double zero, ``a = k (t^2 - w^2) / 2``, a slide that is left at -2w touches rest at w.
+_APPEARS_TOUCHING = (-2.0, 1.0)
+#: Where the segments of an edited itinerary come from, as :func:`contfric.signature.edits.edited_pieces`
+#: says.
+Origin = tuple[int, int]
+
+
+class RestsForEver(NotationError):
+    """Nothing follows an event because nothing moves any more."""
+
+
+@dataclass(frozen=True)
+class Successor:
+    """What follows at one location: one of the outcomes there.
+
+    Attributes
+    ----------
+    edit : the change of the itinerary
+    joints : start joints of the segments that come in or move, by their origin
+    reason : what happens, in words
+    away : where the new orbit is singular at the event itself, how fast its joints move in time when it
+        leaves: where a slide of length zero appears in a rest, and where a hold is left without
+        acceleration
+    """
+
+    edit: Edit
+    joints: Mapping[Origin, FloatArray]
+    reason: str
+    away: Mapping[Origin, float] = field(default_factory=dict)
+
+
+def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
+    """Return what can follow at one location of a whole orbit.
+
+    Raises
+    ------
+    NotationError
+        If nothing can: the reason says why.
+    """
+    mode, exit_ = orbit.itinerary[location.segment]
+    if is_hold(exit_):
+        return _hold_ends(orbit, location)
+    if reset := chosen_at(orbit.system, location):
+        raise NotationError(f"at '{reset}' another mode is chosen: nothing lies between the two")
+    if entered := entered_at(orbit.system, location):
+        raise NotationError(
+            f"a touch of {location.surface} leads into '{entered}' for good: no orbit is near"
+        )
+    if location.margin is Margin.ENTRY:
+        raise NotationError(
+            f"another mode follows the impact before segment {location.segment + 1}"
+        )
+    if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
+        return _impact_at_joint(orbit, location)
+    if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
+        edit, joints, away, reason = continuous_edit(orbit, location)
+        return Successor(edit, joints, reason, away)
+    if kind is Kind.CS:
+        i, surface = location.segment, location.surface
+        edit, joints = (
+            swap_edit(orbit.itinerary, {i: surface}, orbit.model),
+            {(i, 0): orbit.ends[i]},
+        )
+        return Successor(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
+    if kind is Kind.SS:
+        return _stop_on_surface(orbit, location)
+    if orbit.model.reset_at(mode, location.surface) is not None:
+        return _grazing_impact(orbit, location)
+    if location.margin is Margin.JOINT:
+        raise NoJump(f"{location.surface} is touched at a section: nothing can be held there")
+    if location.margin is Margin.LASTING:
+        return _pinned_at_stop(orbit, location)
+    rests, ends = ends_rest(orbit.model, mode, location.surface), location.margin is Margin.EXIT
+    if rests:
+        return _released_tangentially(orbit, location) if ends else _limit_touched(orbit, location)
+    return _stops_tangentially(orbit, location) if ends else _rest_touched(orbit, location)
+
+
+def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Successor:
+    """SS: the stop is on a surface, and the load falls."""
+    model, itinerary, i = orbit.model, orbit.itinerary, location.segment
+    j = (i + 1) % len(itinerary)
+    if slides.goes_nowhere(orbit, j):
+        return Successor(*slides.left_out(orbit, j))
+    rest = rest_mode(orbit, i, itinerary[i][1])
+    check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
+    if model.lies_on(itinerary[j][0], itinerary[i][1]):
+        return _stick_becomes_hold(orbit, j, hold_at(location.surface), location.surface)
+    edit = insert(i, (rest, hold_at(location.surface)))
+    reason = f"hold at stop {i + 1}, on {location.surface}, instead of the reversal"
+    return Successor(edit, {(i, 0): orbit.ends[i]}, reason)
+
+
+def _stops_tangentially(orbit: Orbit, location: EventFunction) -> Successor:
+    """GS: a stop without acceleration."""
+    itinerary, i = orbit.itinerary, location.segment
+    j = (i + 1) % len(itinerary)
+    rest_mode(orbit, i, itinerary[i][1])
+    if not orbit.model.lies_on(itinerary[j][0], itinerary[i][1]):
+        raise NotationError(f"the tangential stop of segment {i + 1} is followed by no stick")
+    if slides.only_touches(orbit, j):
+        return Successor(*slides.touch_alone(orbit, j))
+    check_inside(orbit, itinerary[j][0], orbit.ends[i])
+    return _stick_becomes_hold(orbit, j, TOUCH, None)
+
+
+def _released_tangentially(orbit: Orbit, location: EventFunction) -> Successor:
+    """AS: a stick is released where its load just reaches the limit."""
+    i, (mode, exit_) = location.segment, orbit.itinerary[location.segment]
+    if slides.only_touches(orbit, i + 1):
+        return Successor(*slides.touch_alone(orbit, (i + 1) % len(orbit.itinerary)))
+    check_held(orbit, mode, release_mode(orbit.model, mode, exit_), orbit.ends[i])
+    edit = insert(i, (mode, TOUCH))
+    reason = f"hold after the tangential release of stick {i + 1} at {orbit.itinerary[i][1]}"
+    return Successor(edit, {(i, 0): orbit.ends[i]}, reason)
+
+
+def _pinned_at_stop(orbit: Orbit, location: EventFunction) -> Successor:
+    """AS: the stick up to a touch of the limit has shrunk to nothing, at a stop on the limit."""
+    i, surface = location.segment, orbit.itinerary[location.segment][1]
+    edit = Edit(frozenset({i}), {(i + 1) % len(orbit.itinerary): hold_at(surface)})
+    return Successor(edit, {}, f"stick {i + 1} vanishes: the hold after it starts at the stop")
+
+
+def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
+    """AS: inside of a stick its load touches the limit."""
+    model, itinerary, i = orbit.model, orbit.itinerary, location.segment
+    mode, exit_ = itinerary[i]
+    j = (i + 1) % len(itinerary)
+    touch = touch_of(orbit, i, location.surface)
+    departs = _released(model, mode, location.surface)
+    if model.filippov:
+        return Successor(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
+    check_held(orbit, mode, departs, touch)
+    reason = f"hold after the touch of {location.surface} in stick {i + 1}"
+    if _touched_before(orbit, location):
+        raise NotationError(
+            f"{reason}: its equal was touched before, and what is left of it slides"
+        )
+    still = first_zero_acceleration(orbit, i, touch[0], departs)
+    if still is not None:
+        left = (departs, left_surface(model, mode, departs))
+        edit = split(i, location.surface, (mode, TOUCH), left, (mode, exit_))
+        away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
+        return Successor(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
+    _same_way(orbit, mode, exit_, departs)
+    if is_hold(itinerary[j][1]):  # the stick ended tangentially: its hold begins earlier
+        edit = Edit(renamed={i: location.surface, j: TOUCH})
+        return Successor(edit, {(j, -1): touch}, reason)
+    return Successor(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+
+
+def _touched_before(orbit: Orbit, location: EventFunction) -> bool:
+    """Tell whether a stick touches the limit at which a hold before it began, after a slide of no length.
+
+    The load has maxima of equal height. The slide moves away from the limit: beyond the event the second one
+    is below it, and nothing is held there.
+    """
+    i, itinerary = location.segment, orbit.itinerary
+    slid = orbit.durations[i - 1] < NEARLY_NO_LENGTH * time_unit(orbit)
+    touched = itinerary[i - 2][1] == TOUCH and itinerary[i - 3][1] == location.surface
+    return bool(len(itinerary) > 3 and slid and touched)
+
+
+def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:
+    """GS: inside of a slide the velocity touches zero."""
+    i = location.segment
+    mode, exit_ = orbit.itinerary[i]
+    touch = touch_of(orbit, i, location.surface)
+    rest = rest_mode(orbit, i, location.surface)
+    if orbit.model.filippov:
+        return Successor(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
+    check_inside(orbit, rest, touch)
+    edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))
+    reason = f"hold at the touch of rest in slide {i + 1}"
+    return Successor(edit, {(i, 0): touch, (i, 1): touch}, reason, {(i, 1): 1.0})
+
+
+def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Successor:
+    """Return the outcome in which a stick that begins at the event is a hold."""
+    model, itinerary = orbit.model, orbit.itinerary
+    mode, exit_ = itinerary[j]
+    behind = (j + 1) % len(itinerary)
+    departs = itinerary[j - 1][0] if surface is None else _released(model, mode, surface)
+    reason = f"hold instead of stick {j + 1}"
+    still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), departs)
+    if still is not None:
+        left = (departs, left_surface(model, mode, departs))
+        edit = split(j, hold, left, (mode, exit_))
+        away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
+        return Successor(edit, {(j, 0): still, (j, 1): still}, reason, away)
+    _same_way(orbit, mode, exit_, departs)
+    edit = split(j, hold)
+    if is_hold(itinerary[behind][1]):  # the stick ended tangentially: one hold replaces both
+        edit |= drop(behind)
+    return Successor(edit, {}, reason)
+
+
+def _released(model: Model, mode: str, surface: str) -> str:
+    """Return the mode that a stick is released to through a surface.
+
+    The limit of a load that contacts share has a name for what the others do. Where one of them changes its
+    state at the event itself, the stick has another limit than that which is met.
+    """
+    found = release_mode(model, mode, surface)
+    if found is None:
+        raise NotationError(
+            f"'{mode}' is not released through {surface}: nothing can be held there"
+        )
+    return found
+
+
+def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
+    """Return what follows where a hold comes to an end of its freedom."""
+    h, itinerary = location.segment, orbit.itinerary
+    before, behind = h - 1, (h + 1) % len(itinerary)
+    after_rest = ends_rest(orbit.model, *itinerary[before])
+    at_touch = itinerary[h][1] == TOUCH
+    no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
+    if orbit.durations[h] < no_length * time_unit(orbit):
+        reason = f"hold {h + 1} vanishes"
+        if at_touch and not after_rest:  # the slide goes on
+            return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
+        return Successor(drop(h), {}, reason)
+    if location.margin is Margin.JOINT:
+        reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
+        return Successor(_as_stick(orbit, h, location.surface, after_rest, ()), {}, reason)
+    if location.margin is Margin.EXIT:
+        return _never_left(orbit, h, after_rest)
+    if location.margin is Margin.INTERIOR:
+        return _pin_moves(orbit, location, after_rest)
+    gone = orbit.durations[behind] < NEARLY_NO_LENGTH * time_unit(orbit)
+    # a second hold, and the slide between them
+    if gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
+        return _never_left(orbit, h, after_rest)
+    touch = touch_of(orbit, h, None)
+    departs = itinerary[behind][0]
+    left = (departs, left_surface(orbit.model, itinerary[h][0], departs))
+    reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
+    edit = insert(h, left, (itinerary[h][0], TOUCH))
+    away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
+    return Successor(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
+
+
+def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[int, ...]) -> Edit:
+    """Return the edit that makes a hold the stick that it stands for, and drops others."""
+    if after_rest:
+        return Edit(frozenset({h, *gone}), {(h - 1) % len(orbit.itinerary): surface})
+    return Edit(frozenset(gone), {h: surface})
+
+
+def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Successor:
+    """Return the outcome where the slide after a hold has vanished: the rest after it takes over."""
+    itinerary, count = orbit.itinerary, len(orbit.itinerary)
+    slide, rest = (h + 1) % count, (h + 2) % count
+    if not orbit.model.lies_on(itinerary[rest][0], itinerary[slide][1]):
+        raise NotationError(f"the slide after hold {h + 1} vanishes, and no rest follows it")
+    reason = f"the slide after hold {h + 1} vanishes: it is held"
+    if rest in (h, (h - 1) % count):
+        raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
+    if itinerary[rest][1] == TOUCH:  # two holds become one
+        return Successor(drop(slide, rest), {}, reason)
+    return Successor(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
+
+
+def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Successor:
+    """Return the outcome where a hold touches its limit: a stick to there, and the hold after it."""
+    h = location.segment
+    touch = touch_of(orbit, h, location.surface)
+    reason = f"hold {h + 1} touches {location.surface}: its pin moves there"
+    if after_rest:
+        if touches_again(orbit, h, location.surface, float(orbit.cycle[h, 0])):
+            raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
+        edit = Edit(renamed={(h - 1) % len(orbit.itinerary): location.surface, h: TOUCH})
+        return Successor(edit, {(h, -1): touch}, reason)
+    edit = split(h, location.surface, (orbit.itinerary[h][0], TOUCH))
+    return Successor(edit, {(h, 0): touch}, reason)
+
+
+def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
+    """Check that a stick is released the way in which a hold would be left."""
+    released = release_mode(orbit.model, mode, exit_)
+    if released != departs:
+        raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
+
+
+def _grazing_impact(orbit: Orbit, location: EventFunction) -> Successor:
+    """GS at a reset: an impact of speed zero comes in, or goes."""
+    itinerary, i = orbit.itinerary, location.segment
+    mode, exit_ = itinerary[i]
+    if thrown_at(orbit, location):
+        raise NotationError(
+            f"after the reset at {location.surface} the solution starts somewhere else: no orbit is near"
+        )
+    if location.margin is Margin.INTERIOR:
+        edit = split(i, location.surface, (mode, exit_))
+        reason = f"impact at the touch of {location.surface} in segment {i + 1}"
+        return Successor(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
+    behind = (i + 1) % len(itinerary)
+    whole = orbit.model.whole_mode
+    reason = f"no impact on {location.surface} after segment {i + 1}"
+    if pair := crossed_at_graze(orbit, i):
+        return Successor(*_renamed(orbit, i, pair), reason)
+    if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
+        raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
+    return Successor(*slides.runs_on(orbit, i, behind), reason)
+
+
+def _impact_at_joint(orbit: Orbit, location: EventFunction) -> Successor:
+    """GS at a reset where a section is crossed: the impact takes the place of the crossing."""
+    i, surface = location.segment, location.surface
+    mode, exit_ = orbit.itinerary[i]
+    if (mode, exit_) not in orbit.model.sections:
+        raise NotationError(f"the wall {surface} is met where segment {i + 1} ends")
+    reason = f"impact at the touch of {surface} where segment {i + 1} ends"
+    return Successor(*_renamed(orbit, i, (orbit.model.whole_mode(mode), surface)), reason)
+
+
+def _renamed(
+    orbit: Orbit, i: int, pair: tuple[str, str]
+) -> tuple[Edit, dict[tuple[int, int], FloatArray]]:
+    """Return the edit that gives a segment another mode and exit, and its joint."""
+    return Edit(frozenset({i}), {}, {i: (pair,)}), {(i, 0): orbit.cycle[i]}

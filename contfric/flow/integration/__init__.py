@@ -1,0 +1,1 @@
+"""Numerical integration of one segment: steps, dense output, stationary points and first roots."""

@@ -1,0 +1,1 @@
+"""The forced oscillator with a constant friction force on each side, in closed form."""

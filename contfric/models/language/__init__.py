@@ -1,0 +1,1 @@
+"""The language of a model's formulas: read as data, differentiated, evaluated."""

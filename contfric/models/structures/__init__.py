@@ -1,0 +1,1 @@
+"""Structures of masses, springs and contacts: as declared, and as the modes that they come down to."""

@@ -1,0 +1,1 @@
+"""Period adding: which itineraries over two orbits have windows next to a bridge."""

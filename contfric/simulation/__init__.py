@@ -1,0 +1,1 @@
+"""Simulation from an initial condition: from event to event, without time steps."""
