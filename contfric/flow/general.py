@@ -29,8 +29,8 @@ from contfric.flow.integration.radau import IMPLICIT_STAGES
 from contfric.flow.integration.stiffness import automatic, automatic_probe
 from contfric.flow.layouts import MODEL
 from contfric.flow.linear.flow import linear_flow
+from contfric.flow.linear.hits import linear_hit
 from contfric.flow.linear.method import explicit_or_linear, explicit_or_linear_probe
-from contfric.flow.linear.search import linear_hit
 from contfric.flow.linear.stationary import linear_stationary
 from contfric.handle import HandleType, with_handle
 
