@@ -74,9 +74,8 @@ class ComposedModel(Model):
     @cached_property
     def composition(self) -> Composition:
         """What modes are made from."""
-        from contfric.models.structures.visited_modes import (
-            composition_of,  # other models need none of it
-        )
+        # other models need none of it
+        from contfric.models.structures.visited_modes import composition_of
 
         return composition_of(self.definition)
 
