@@ -130,3 +130,21 @@ def test_the_time_of_a_search_does_not_grow_with_the_fastest_decay() -> None:
         taken = time.process_time() - begun
     assert len(times) > 5
     assert taken < 0.1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hit_after_millions_of_decays_is_that_of_the_modes(seed: int) -> None:
+    """The load leads to it long after the fastest mode has come to rest, at a rate of decay near 1e6."""
+    structure, lasts = Structure(seed, 1e3, damping=0.9), 3.0
+    view, rest, taus = structure.view(), np.zeros(2 * structure.n), np.linspace(0.0, 3.0, 3001)
+    for start in structure.draw.uniform(0.0, 9.0, 200):
+        speed, _ = structure.velocity(1.0, float(start), rest, taus)
+        early, highest = np.max(speed[: int(0.85 * len(taus))]), np.max(speed)
+        if highest > 1.02 * early > 0.0:
+            break
+    level = 0.5 * (early + highest)
+    found = view.first("p", "v1", level, float(start), rest, lasts, on=False)
+    assert found is not None
+    assert 0.85 * lasts <= found[0] <= lasts
+    there, _ = structure.velocity(1.0, float(start), rest, np.array([found[0]]))
+    assert there[0] == pytest.approx(level, abs=1e-8 * (1.0 + abs(level)))

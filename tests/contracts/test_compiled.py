@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import logging
 import math
 import os
@@ -15,6 +16,7 @@ import pytest
 import yaml
 from numba.core import config
 
+import contfric as cf
 from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.compiling import announced
@@ -23,6 +25,7 @@ from contfric.models.describe import describe
 from contfric.models.generated import build
 from contfric.shipping.ahead import every_kernel
 
+PACKAGE = Path(cf.__file__).parent
 MODELS = Path(__file__).parents[1] / "models"
 
 
@@ -250,3 +253,45 @@ def test_a_slower_machine_multiplies_the_times_of_the_table(fresh_cache):
 
 def test_every_time_of_the_table_is_of_a_kernel():
     assert announced.SECONDS.keys() <= every_kernel().keys()
+
+
+def _returned(function: ast.FunctionDef) -> set[str]:
+    """Return the names of what is called for a value that a function returns, alone or in a tuple."""
+    values = [n.value for n in ast.walk(function) if isinstance(n, ast.Return) and n.value]
+    parts = [p for v in values for p in (v.elts if isinstance(v, ast.Tuple) else [v])]
+    return {p.func.id for p in parts if isinstance(p, ast.Call) and isinstance(p.func, ast.Name)}
+
+
+def _called(function: ast.FunctionDef) -> set[str]:
+    calls = [n.func for n in ast.walk(function) if isinstance(n, ast.Call)]
+    return {called.id for called in calls if isinstance(called, ast.Name)}
+
+
+def test_what_counts_references_calls_no_helper_that_hands_back_arrays():
+    """A helper does not count them: numba would free arrays of a workspace that are in use."""
+    arrays, helpers, counting = set(), {}, {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and "NamedTuple" in map(ast.unparse, node.bases):
+                arrays |= {node.name} if "Array" in ast.unparse(node) else set()
+            if isinstance(node, ast.FunctionDef):
+                marks = [ast.unparse(mark) for mark in node.decorator_list]
+                if {"helper", "inlined_helper"} & set(marks):
+                    helpers[path, node.name] = node
+                elif any(m == "allocating_helper" or m.startswith("kernel(") for m in marks):
+                    counting[path, node.name] = node, any("counts=False" in m for m in marks)
+    handing: set[str] = set()
+    while (
+        more := {n for (_, n), h in helpers.items() if _returned(h) & (arrays | handing)} - handing
+    ):
+        handing |= more
+    assert "system_in" in handing
+    assert len(counting) > 10
+    for (path, name), (function, without) in counting.items():
+        wrong = {k for k in _called(function) & handing if not _is_own(path, k, helpers, arrays)}
+        assert without or not wrong, f"{name} of {path.name} has to leave {wrong} to a helper"
+
+
+def _is_own(path, name, helpers, arrays):
+    """Tell whether a name is that of another helper, one of the same module that hands nothing back."""
+    return (path, name) in helpers and not _returned(helpers[path, name]) & arrays

@@ -76,7 +76,7 @@ def begin_long(motion, piece, rate, spread, grown, dt, memory, system):  # type:
     """Return where the powers of the matrix are, and when long steps begin: -1 and never where none pays."""
     if memory.shape[0] == 0 or not rate * dt > _LONG:
         return -1, math.inf
-    _, h = cut(rate, 1.0 / rate)
+    _, h = cut(rate, dt)
     place = ladder_of(motion, piece, h, rate, spread, grown, memory, system) if h > 0.0 else -1
     return place, math.ldexp(LAG * h, _FIRST_STEP) if place >= 0 else math.inf
 
@@ -162,10 +162,11 @@ def write_lag(motion, piece, c, level, step, count, ladder, sight, pairs, seen, 
 
 
 @helper
-def enter_level(motion, piece, c, level, count, rate, spread, place, co, late, system):  # type: ignore[no-untyped-def]
+def enter_level(motion, piece, c, level, count, rate, spread, place, used, co, late, system):  # type: ignore[no-untyped-def]
     """Prepare steps of the next length; return (where their rows are, the length, the number of forces).
 
-    -1 as the place where the rows do not become small, or there is no power for them.
+    -1 as the place where the rows do not become small, or there is no power for them: the search goes on with
+    those that it uses, which are not overwritten.
     """
     memory, space, seen = late
     n, entries = system.work.shape[1], system.co.shape[0]
@@ -175,7 +176,7 @@ def enter_level(motion, piece, c, level, count, rate, spread, place, co, late, s
     step = math.ldexp(ladder.head[H], level + _FIRST_STEP)
     slots, _ = places_in(memory, n, entries, system.w.shape[0])
     key, stamp = -1.0 - c - _APART * (level + 1.0), ladder.head[STAMP]
-    at, known = find(memory, piece, key, stamp, -1, slots)
+    at, known = find(memory, piece, key, stamp, used, slots)
     sight = sight_in(memory, at, n, entries)
     if not (known and same(sight.co, co, entries)):
         for j in range(entries):

@@ -32,8 +32,8 @@ from contfric.compiling.vectors import (
 )
 from contfric.flow.linear.system import TERMS, FloatArray, terms_for
 
-#: Doublings: 2**24 steps.
-LEVELS = 24
+#: Doublings: 2^27 steps of a sixteenth of 1 / rate or more are longer than any solution, 6e6 / rate.
+LEVELS = 27
 #: Where things are in the head: h, a number that no other matrix has, powers that are there, first
 #: coefficient of a wave, rows with waves, rate of the matrix and spread of its units.
 H, STAMP, KNOWN, FIRST, ROWS, RATE, SPREAD, HEAD = range(8)

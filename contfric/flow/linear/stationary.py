@@ -66,7 +66,7 @@ def stationary_in(motion, piece, c, t0, dt, p, reach, system, sight, seen, polys
     while done < dt:
         if done >= begin:
             following, length, count_of = enter_level(
-                motion, piece, c, level + 1, forces, rate, spread, powers, sight, late, system
+                motion, piece, c, level + 1, forces, rate, spread, powers, at, sight, late, system
             )
             begin = 2.0 * done if following >= 0 else math.inf
             if following >= 0:
