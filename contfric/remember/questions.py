@@ -9,6 +9,7 @@ a change there goes unseen.
 from __future__ import annotations
 
 import functools
+import json
 from types import CellType, CodeType, FunctionType
 from typing import Any
 
@@ -52,7 +53,13 @@ class Question(Writer):
             return None
 
     def _constant(self, value: Any) -> Any:
-        return self._node(value) if isinstance(value, CodeType) else repr(value)
+        if isinstance(value, CodeType):
+            return self._node(value)
+        if isinstance(value, frozenset):  # its order is that of a process
+            return ["frozenset", *sorted(map(self._constant, value), key=json.dumps)]
+        if isinstance(value, tuple):
+            return ["tuple", *map(self._constant, value)]
+        return repr(value)
 
     def _global(self, function: FunctionType, name: str) -> Any:
         value = function.__globals__.get(name)

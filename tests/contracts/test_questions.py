@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import importlib
+import os
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -158,3 +160,24 @@ def test_a_run_goes_on_only_with_the_same_function(
         return key_of(read_study(study))
 
     assert key_with(1.0) == key_with(1.0) != key_with(2.0)
+
+
+def test_a_function_is_the_same_in_every_process():
+    """The order of texts in a set of its code is another one in each."""
+    code = """
+from contfric.remember.questions import Question
+
+def width(orbit):
+    return 1.0 if orbit in {"a", "bb", "ccc", "dddd"} else float((orbit, {"x", "yy", "zzz"}) in [])
+
+print(Question().bytes_of(width).hex())
+"""
+    told = set()
+    for seed in "123":
+        env = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+        )
+        told.add(done.stdout)
+    assert len(told) == 1
+    assert told.pop().strip()
