@@ -146,5 +146,6 @@ def test_a_hit_after_millions_of_decays_is_that_of_the_modes(seed: int) -> None:
     found = view.first("p", "v1", level, float(start), rest, lasts, on=False)
     assert found is not None
     assert 0.85 * lasts <= found[0] <= lasts
+    assert found[1][structure.n] == pytest.approx(level, abs=1e-8 * (1.0 + abs(level)))
     there, _ = structure.velocity(1.0, float(start), rest, np.array([found[0]]))
     assert there[0] == pytest.approx(level, abs=1e-8 * (1.0 + abs(level)))
