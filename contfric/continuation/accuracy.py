@@ -13,7 +13,6 @@ an equation at the located point, and the rounding of the motion there. The sum 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,8 +39,6 @@ from contfric.orbit.solve import refine
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than
 #: the rounding of one, and no diagram resolves it.
 LEAST = 1e-11
-#: Differences of a margin, relative: its second derivative costs this much of the first, which is enough.
-_DIFFERENCE = 1e-7
 #: Neighbours at which a multiplier is evaluated: distance in the parameter, as a share of 1 + its value and
 #: of the range. Far above rounding, and multipliers are parabolas there.
 _BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
@@ -66,16 +63,8 @@ _OFF_PARABOLA = 2.0
 _SINGULAR = 1e-6
 
 
-@dataclass(frozen=True)
-class _Condition:
-    """What vanishes at an event, and the segment on whose joints it depends.
-
-    ``gradient`` is that on the joints, shape (N + 1, m), and on the parameter, where it is known.
-    """
-
-    value: Callable[[Orbit], float]
-    segment: int
-    gradient: tuple[FloatArray, float] | None = None
+#: What vanishes at an event: its value, and its gradient on the joints, shape (N + 1, m), and the parameter.
+_Condition = tuple[float, tuple[FloatArray, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +157,10 @@ class Estimate:
         return best
 
 
-def _margin(here: Orbit, test: EventFunction, active: int) -> _Condition:
-    k = here.system.tests.index(test)
+def _margin(here: Orbit, test: EventFunction, active: int) -> _Condition | None:
     gradient = gradient_of(here.as_whole(), test, here.system.segments, active)
-    return _Condition(lambda orbit: float(orbit.margins[k]), test.segment, gradient)
+    value = float(here.margins[here.system.tests.index(test)])
+    return None if gradient is None else (value, gradient)
 
 
 def _touch(here: Orbit, test: EventFunction, active: int) -> _Condition | None:
@@ -180,12 +169,7 @@ def _touch(here: Orbit, test: EventFunction, active: int) -> _Condition | None:
     if not len(gaps):
         return None
     k = int(np.argmin(np.abs(gaps)))
-
-    def value(orbit: Orbit) -> float:
-        beside = _gaps(orbit, test)
-        return float(beside[k]) if len(beside) == len(gaps) else float("nan")
-
-    return _Condition(value, test.segment, _gap_gradient(here, test, k, active))
+    return float(gaps[k]), _gap_gradient(here, test, k, active)
 
 
 def _gap_gradient(
@@ -234,38 +218,13 @@ def _gaps(orbit: Orbit, test: EventFunction) -> FloatArray:
 
 def _error_of(orbit: Orbit, active: int, condition: _Condition) -> float | None:
     """Return the error of a parameter that the orbit and a condition fix together."""
-    value = condition.value(orbit)
+    value, (on_joints, slope) = condition
     if not np.isfinite(value):
         return None
-    scale = 1.0 + float(np.abs(orbit.joints).max())
-    left = abs(value) + orbit.model.rounding * scale
-    return moved_by_errors(orbit, active, _gradient(orbit, active, condition, value), left)
-
-
-def _gradient(orbit: Orbit, active: int, condition: _Condition, value: float) -> FloatArray:
-    """Return the derivatives of a condition by the joints and the parameter, shape (N m + 1,)."""
-    count, m = orbit.joints.shape
-    row = np.zeros(count * m + 1)
-    if condition.gradient is not None and not orbit.model.resets:
-        on_joints, row[-1] = condition.gradient
-        close = np.eye(m)
-        close[0, 0] = 0.0 if orbit.model.autonomous else 1.0
-        close[1:, 1:] = orbit.system.layout.closing
-        row[:-1] = on_joints[:-1].ravel()
-        row[:m] += on_joints[-1] @ close
-        row[-1] += on_joints[-1] @ closing(orbit, active)
-        return row
-    for i in {condition.segment, (condition.segment + 1) % count}:
-        for j in range(m):
-            joints = orbit.joints.copy()
-            step = _DIFFERENCE * (1.0 + abs(joints[i, j]))
-            joints[i, j] += step
-            row[i * m + j] = (condition.value(altered(orbit, joints=joints)) - value) / step
-    vector = orbit.vector.copy()
-    step = _DIFFERENCE * orbit.model.size_of(active, vector[active])
-    vector[active] += step
-    row[-1] = (condition.value(altered(orbit, vector=vector)) - value) / step
-    return row
+    row = np.append(on_joints[:-1], slope + on_joints[-1] @ closing(orbit, active))
+    row[: len(on_joints[-1])] += on_joints[-1] @ orbit.system.closing
+    left = abs(value) + orbit.model.rounding * (1.0 + float(np.abs(orbit.joints).max()))
+    return moved_by_errors(orbit, active, row, left)
 
 
 def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> float | None:

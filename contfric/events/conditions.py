@@ -36,7 +36,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.linear import jacobian_blocks, linearised
 from contfric.bvp.system import EventFunction, Margin
-from contfric.events.gradients import closing, gradient_of, held_gradient
+from contfric.events.gradients import closing, gradient_of
 from contfric.events.incident import vanishing
 from contfric.events.outcomes import NEARLY_NO_LENGTH
 from contfric.events.unit import Form
@@ -202,21 +202,13 @@ def _gradients(
         inside = location.margin in (Margin.HELD, Margin.INTERIOR)
         if location.segment >= count or (inside and own in parted):
             continue
-        gradient = (
-            held_gradient(whole, location.segment, count, active)
-            if held
-            else gradient_of(whole, location, count, active)
-        )
+        gradient = gradient_of(whole, location, count, active)
         if gradient is not None:
             found.append(gradient)
     for left in parted:
-        gradient = (
-            held_gradient(whole, left.segment, count, active)
-            if left.surface is None
-            else gradient_of(
-                whole, EventFunction(Margin.INTERIOR, left.segment, left.surface), count, active
-            )
-        )
+        margin = Margin.HELD if left.surface is None else Margin.INTERIOR
+        parting = EventFunction(margin, left.segment, left.surface or "")
+        gradient = gradient_of(whole, parting, count, active)
         if gradient is not None:
             found.append((-gradient[0], -gradient[1]))
     return found

@@ -27,7 +27,12 @@ def closing(orbit: Orbit, active: int) -> FloatArray:
 def gradient_of(
     orbit: Orbit, location: EventFunction, count: int, active: int
 ) -> tuple[FloatArray, float] | None:
-    """Return the gradient of one margin; None if it has none to first order."""
+    """Return the gradient of one margin on the joints and on the parameter; None if nothing is stationary.
+
+    It is that along orbits. Off them the margin may differ: a mode moves a state onto its surfaces first.
+    """
+    if location.margin is Margin.HELD:
+        return _held_gradient(orbit, location.segment, count, active)
     i, m = location.segment, orbit.joints.shape[1]
     gradient, slope = np.zeros((count + 1, m)), 0.0
     held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
@@ -43,7 +48,10 @@ def gradient_of(
         gradient[i + 1], slope = _rate_gradient(
             orbit, mode, location.surface, orbit.ends[i], active
         )
-    elif location.margin is Margin.INTERIOR:
+    elif location.margin is Margin.ENTRY:
+        there, slope = surface_gradient(orbit, location.surface, orbit.begins[i], active)
+        gradient[i], slope = before_reset(orbit, i, there, slope, active)
+    else:
         try:
             touch = touch_of(orbit, i, location.surface)
         except NotationError:
@@ -59,12 +67,12 @@ def gradient_of(
         there, slope = surface_gradient(orbit, location.surface, touch, active)
         gradient[i], moves = carried(orbit, i, touch, there, active)
         slope += moves
-    else:
-        return None
     return sign * gradient, sign * slope
 
 
-def held_gradient(orbit: Orbit, i: int, count: int, active: int) -> tuple[FloatArray, float] | None:
+def _held_gradient(
+    orbit: Orbit, i: int, count: int, active: int
+) -> tuple[FloatArray, float] | None:
     """Return the gradient of the least acceleration with which a hold could be left inside, if it has one.
 
     The time at which it is least is stationary: it does not move the value.
@@ -87,7 +95,9 @@ def _sign(orbit: Orbit, location: EventFunction) -> float:
     if location.margin is Margin.EXIT:
         return float(layout.exit_signs[i])
     k = orbit.model.surface_index[location.surface]
-    rows = layout.joint if location.margin is Margin.JOINT else layout.interior
+    rows = layout.interior
+    if location.margin is not Margin.INTERIOR:
+        rows = layout.joint[layout.joint[:, 3] == int(location.margin is Margin.ENTRY)]
     return float(next((row[2] for row in rows if row[0] == i and row[1] == k), 0.0))
 
 

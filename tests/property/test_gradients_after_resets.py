@@ -1,7 +1,8 @@
-"""Gradients of what vanishes inside of a segment that follows a reset, on the joint before the reset.
+"""Gradients of margins of orbits with resets: on the joint before a reset, and along all orbits.
 
 They tell which orbits begin at a graze, and how exact its place is. The reference is a central difference:
-the joint and a parameter are moved, the state is mapped by the reset and followed by scipy.
+the joint and a parameter are moved, the state is mapped by the reset and followed by scipy; or orbits are
+solved at other parameters. Gradients are compared along orbits, as off them a stick has no meaning.
 """
 
 from __future__ import annotations
@@ -15,8 +16,11 @@ from scipy.optimize import minimize_scalar
 
 import contfric as cf
 from contfric.base.arrays import FloatArray
+from contfric.base.attributes import altered
+from contfric.bvp.linear import null_space
 from contfric.bvp.system import Margin
-from contfric.events.gradients import gradient_of
+from contfric.events.gradients import closing, gradient_of
+from contfric.orbit.solve import refine
 
 WALLS = """
 name: two-walls
@@ -35,6 +39,28 @@ resets:
   right: {v: -e*v*(1 + b*cos(w*t))}
   left: {v: -e*v}
 """
+BRACED = """
+name: braced-floors
+coordinates: [q1, q2]
+parameters: {W: 0.6, F: 0.3, c: 0.1, S: 0.1, d: 0.5, e: 0.6}
+period: 2*pi/W
+mass: [1, 1]
+damping: [c, c]
+stiffness: [[2, -1], [-1, 1]]
+force: {q1: F*cos(W*t), q2: F*cos(W*t)}
+contacts:
+  brace: {kind: friction, velocity: v2 - v1, kinetic: S, static: S}
+  roof: {kind: impact, gap: d - q2, restitution: e}
+"""
+#: Parameters of floors that come to an orbit with impacts, three of five of them with sticks.
+RANGES = {
+    "W": (0.4, 0.8),
+    "F": (0.2, 0.5),
+    "c": (0.05, 0.2),
+    "S": (0.02, 0.1),
+    "d": (0.3, 0.6),
+    "e": (0.3, 0.8),
+}
 NAMES = ("F", "zeta", "d", "far", "e", "b")
 #: Step of the differences: rounding of scipy's 1e-12 over it, and its square, are 1e-7.
 STEP = 1e-5
@@ -94,3 +120,38 @@ def test_heights_after_an_impact(seed: int, tmp_path: Path) -> None:
             moved = [lowest(joint + s * apart, params, until) for s in (1, -1)]
             expected = (moved[0] - moved[1]) / (2 * STEP)
             assert found[0][i, k] == pytest.approx(expected, rel=1e-4, abs=1e-5)
+
+
+def along_orbits(orbit: cf.Orbit, k: int, active: int) -> float:
+    """Return the derivative of a margin along the curve of orbits, by its gradient."""
+    (moves,), (share,) = null_space(orbit.system, orbit.joints, orbit.vector, active)
+    by_parameter = moves / share
+    last = orbit.system.closing @ by_parameter[0] + closing(orbit, active)
+    found = gradient_of(orbit.as_whole(), orbit.system.tests[k], len(moves), active)
+    assert found is not None
+    return float(np.vdot(found[0], [*by_parameter, last]) + found[1])
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 5])  # 4 is aperiodic
+def test_margins_along_orbits(seed: int, tmp_path: Path) -> None:
+    path = tmp_path / "floors.yaml"
+    path.write_text(BRACED)
+    rng = np.random.default_rng([46, 2 * seed])
+    params = {name: float(rng.uniform(*ends)) for name, ends in RANGES.items()}
+    orbit = cf.find_orbit(path, params, longest=400)
+    compared = set()
+    for name in RANGES:
+        active = orbit.model.index_of(name)
+        beside = []
+        for sign in (1.0, -1.0):
+            vector = orbit.vector.copy()
+            vector[active] += sign * STEP
+            beside.append(refine(altered(orbit, vector=vector)))
+            assert beside[-1].converged
+        for k, test in enumerate(orbit.system.tests):
+            after, before = (float(other.margins[k]) for other in beside)
+            if np.isfinite([after, before]).all():  # else nothing is stationary inside
+                expected = (after - before) / (2 * STEP)
+                assert along_orbits(orbit, k, active) == pytest.approx(expected, rel=1e-5, abs=1e-5)
+                compared.add(test.margin)
+    assert compared == {Margin.INTERIOR, Margin.EXIT, Margin.JOINT, Margin.ENTRY}
