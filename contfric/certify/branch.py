@@ -250,6 +250,9 @@ def cover(tracer: Tracer, progress: Callable[[str], None] | None = None) -> list
         part, k = list[Piece](), start
         tracer.begin()
         while k < stop:
+            if tracer.is_twice(k):
+                k += 1
+                continue
             found, k = tracer.step(k, stop)
             part += found
             if progress is not None:

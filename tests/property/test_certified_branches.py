@@ -311,6 +311,44 @@ def test_where_equations_are_singular_all_along_few_boxes_are_tried() -> None:
     assert tracer.count < 40 * len(branch)
 
 
+@pytest.mark.parametrize("start", [0.7, 0.69])
+def test_a_doubling_without_excitation_is_held_by_both_tubes(start: float) -> None:
+    """The doubled cycle, from any of its joints, is two turns of the cycle, each in a clock of its own."""
+    model = "tests/models/switched.yaml"
+    cycle = cf.find_orbit(model, {"A": start})
+    diagram = cf.explore(cycle, "A", (start, 0.74))
+    (event,) = (b for b in diagram.bifurcations if b.kind == "PD")
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        found = branch.certify()
+        assert found.complete and found.events == (event.label,), (found.gaps, found.open)
+
+
+@pytest.mark.parametrize("first", range(4))
+def test_the_turns_of_a_doubled_cycle_wherever_it_begins(first: int) -> None:
+    """Joints to turns and back; the turns end at time 0, where the other one begins."""
+    cycle = cf.find_orbit("tests/models/switched.yaml", {"A": 0.7})
+    diagram = cf.explore(cycle, "A", (0.7, 0.74))
+    branch = next(b for b in diagram.branches if b[0].system.segments == 4)
+    proofs = [b.certify("A") for b in branch.bifurcations]
+    with working(80):
+        (flip,) = (f for f in Tracer(branch, proofs, np.inf).flips if f is not None)
+        order = [(first + k) % 4 for k in range(4)]
+        wraps = [int(first + k >= 4) for k in range(4)]
+        turns = replace(flip.turns, places=tuple(zip(order, map(arb, wraps), strict=True)))
+        rng = np.random.default_rng(first)
+        period, joints = 12.5, rng.normal(size=(4, 4))
+        joints[:, 0] = [-period, *np.sort(rng.uniform(-period, 0, 3))]
+        z = [arb(float(c)) for c in joints.ravel()]
+        one, other = turns.of(z)
+        absolute = joints[order, 0] + period * np.array(wraps)
+        lasts = [absolute[2] - absolute[0], absolute[0] + period - absolute[2]]
+        assert [float(-one[0]), float(-other[0])] == pytest.approx(lasts)
+        assert float(one[4] - one[0]) == pytest.approx(absolute[1] - absolute[0])
+        back = turns.joined(one, other)
+        assert max(abs(float(a - b)) for a, b in zip(back, z, strict=True)) < 1e-12
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_branch_that_starts_near_a_saddle_is_covered_from_where_its_orbits_are_alone(
     seed: int, monkeypatch: pytest.MonkeyPatch
