@@ -213,12 +213,7 @@ def certify_branch(
         points.append(certify_orbit(orbit, inside=False, until=until))
     with working(_BITS):
         tracer = Tracer(branch, proofs, until, points)
-        pieces, steps, k = list[Piece](), len(branch) - 1, 0
-        while k < steps:
-            found, k = tracer.step(k)
-            pieces += found
-            if progress is not None:
-                progress(f"{branch.name}, step {k} of {steps}, {tracer.count} boxes")
+        pieces = cover(tracer, progress)
     points = [
         replace(point, admissible=Finding(Verdict.PROVED))  # all orbits of its box are
         if k in tracer.obeying
@@ -229,3 +224,40 @@ def certify_branch(
     return BranchCertificate(
         branch, tuple(pieces), tracer.ended, tuple(points), tuple(proofs), held
     )
+
+
+def _parts(tracer: Tracer) -> list[tuple[int, int]]:
+    """Return the parts of a branch in the order in which they are to be covered: numbers of their points.
+
+    Where it starts without an event (near a saddle, say) its equations may be nearly singular, so that the
+    boxes of a few steps would take all the time. So it is covered from the first printed orbit on that is
+    proved to be alone, and then from parts next to that towards the start.
+    """
+    at_event = tracer.has_edge(0) or tracer.flips[0] is not None
+    start = 0 if at_event else min(tracer.unique, default=0)
+    last = len(tracer.branch) - 1
+    parts = [(start, last)] if start < last else []
+    while start > 0:
+        parts.append((start // 2, start))
+        start //= 2
+    return parts
+
+
+def cover(tracer: Tracer, progress: Callable[[str], None] | None = None) -> list[Piece]:
+    """Return the pieces of a branch, in its order, whatever part of it is covered first."""
+    pieces, branch, begun = list[Piece](), tracer.branch, None
+    for start, stop in _parts(tracer):
+        part, k = list[Piece](), start
+        tracer.begin()
+        while k < stop:
+            if tracer.is_twice(k):
+                k += 1
+                continue
+            found, k = tracer.step(k, stop)
+            part += found
+            if progress is not None:
+                progress(f"{branch.name}, step {k} of {len(branch) - 1}, {tracer.count} boxes")
+        if begun is not None and pieces[0].exists:
+            pieces[0] = tracer.linked(pieces[0], begun)
+        pieces, begun = part + pieces, tracer.begun
+    return pieces

@@ -111,11 +111,12 @@ def _flip(tracer: Tracer, turns: Turns, split: Split) -> Flip:
     """Return what is proved of the orbits of two turns in the box of their event."""
     turn, v = split.turn, split.centre[split.size : -1]
     admissible = tracer.obeys(turns.system, turns.segments, turn)
-    whole = [*turns.joined(turn[:-1], turn[:-1]), turn[-1]]
-    flips = 0 if has_no_flip(tracer.segments, tracer.build, whole) else UNKNOWN
+    chain = tracer.segments, tracer.build
+    wholes = [[*turns.joined(*pair), turn[-1]] for pair in split.pairs()]
+    flips = 0 if all(has_no_flip(*chain, whole) for whole in wholes) else UNKNOWN
     folds = 0 if split.one_sided else UNKNOWN
     labels = (turns.proof.event.label,) if turns.is_event(split.box, split.functional) else ()
-    tori = 0 if is_off(tracer.segments, tracer.build, tracer.closes, whole) else UNKNOWN
+    tori = 0 if all(is_off(*chain, tracer.closes, whole) for whole in wholes) else UNKNOWN
     piece = Piece(0, 0, (0, 0), True, admissible, folds, flips, tori, events=labels)
     return Flip(turns, split, piece, [*turns.directed(v, [-c for c in v]), arb(0)])
 

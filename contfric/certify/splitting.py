@@ -81,6 +81,17 @@ class Split:
         """Balls of the joints and the parameter of all turns of all orbits in it."""
         return spread(self.box, self.size, self.reach)
 
+    def pairs(self) -> list[tuple[Vector, Vector]]:
+        """Return balls of both turns of its orbits, part by part of the way to e = reach.
+
+        At -e there is the orbit of e, begun a turn later.
+        """
+        u, v = self.box[: self.size], self.box[self.size : -1]
+        edges = [self.reach * k / _PARTS for k in range(_PARTS + 1)]
+        parts = [a.union(b) for a, b in pairwise(edges)]
+        line = list(zip(u, v, strict=True))
+        return [([a + e * b for a, b in line], [a - e * b for a, b in line]) for e in parts]
+
     @property
     def one_sided(self) -> bool:
         """Whether all orbits of two turns lie on one side of the event, and the parameter is monotone."""

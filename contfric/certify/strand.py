@@ -161,6 +161,12 @@ class Strand:
         k = -1 if forward else 0
         return float(self.branch.arc[k]), float(self.branch.values[k])
 
+    def is_twice(self, k: int) -> bool:
+        """Tell whether the step from point k has no length: where a branch starts at the end of its range."""
+        arc = self.branch.arc
+        at_end = (k == 0 and self.has_edge(0)) or (k + 2 == len(arc) and self.has_edge(-1))
+        return bool(arc[0] < arc[-1] and arc[k] == arc[k + 1]) and not at_end
+
     def has_edge(self, end: int) -> bool:
         """Tell whether the branch ends at an event of its inequalities."""
         if self.branch.ends[end].reason.name in [kind.value for kind in TERMINAL]:

@@ -70,20 +70,14 @@ class Tracer(Strand):
         points: Sequence[Certificate] = (),
     ) -> None:
         super().__init__(branch)
-        self.until = until
-        self.last: Box | Vector | None = None
-        self.count, self.ended, self.length = 0, "", math.inf
-        self._known: tuple[int, Vector | None] = (-1, None)  # number of a point, and its orbit
-        self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
-        # the last box that was proved, and how many in a row before one of several steps is tried
-        self.proved_length, self.patience = 0.0, _STEADY
-        self.turning = False  # whether a box could not show that the parameter is monotone
+        self.until, self.count, self.ended = until, 0, ""
+        self._known: dict[int, Vector | None] = {}  # orbits next to printed ones, by number
+        self.begin()
         self.met = self.met_by(proofs)
         self.flips = [self._flip(proofs, end) for end in (0, -1)]
         self.printed_orbits = self.enclosed(points)
         self.unique = {k for k, point in enumerate(points) if point.unique.proved}
-        self.held: set[int] = set()
-        self.obeying: set[int] = set()
+        self.held, self.obeying = set[int](), set[int]()
         for flip in self.flips:
             if flip is not None:
                 self._hold(flip)
@@ -114,24 +108,36 @@ class Tracer(Strand):
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, k: int) -> tuple[list[Piece], int]:
-        """Cover the branch from point k to a later one; return its number, too.
+    def begin(self) -> None:
+        """Begin a part of the branch: of boxes before it nothing is known."""
+        self.last: Box | Vector | None = None
+        self.begun: Box | None = None  # its first box
+        self.length = math.inf
+        self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
+        # the last box that was proved, and how many in a row before one of several steps is tried
+        self.proved_length, self.patience = 0.0, _STEADY
+        self.turning = False  # whether a box could not show that the parameter is monotone
+
+    def step(self, k: int, stop: int) -> tuple[list[Piece], int]:
+        """Cover the branch from point k to a later one, at most ``stop``; return its number, too.
 
         That is the next one, or one that is about as far as the last box reached.
         """
-        last, before = self._reached(k), self.last
+        last, before = self._reached(k, stop), self.last
+        if self.unique >= {k, last}:
+            self.missed = 0  # the equations are regular here
         found = self._step(k, last)
         if last > k + 1 and not all(piece.exists for piece in found) and self.goes_on():
             self.last, last = before, k + 1  # no orbit was found halfway: the branch bends much
             found = self._step(k, last)
         return found, last
 
-    def _reached(self, k: int) -> int:
+    def _reached(self, k: int, stop: int) -> int:
         """Return the last point up to which a box is tried from point k: one step, or more."""
         arc, found = self.branch.arc, k + 1
         grows = _GROWTH if self.steady >= self.patience else _SAME
         most = grows * min(self.length, self.proved_length)
-        while not (self._is_special(k) or self._is_special(found)):
+        while found < stop and not (self._is_special(k) or self._is_special(found)):
             if arc[found + 1] - arc[k] > most:
                 break
             found += 1
@@ -241,9 +247,9 @@ class Tracer(Strand):
 
     def _exact(self, k: int, printed: Vector, plane: Vector) -> Vector | None:
         """Return the orbit next to a printed point, which two steps of the branch share."""
-        if self._known[0] != k or self._known[1] is None:
-            self._known = k, solved(self.segments, self.build, self.plain, printed, plane)
-        return self._known[1]
+        if self._known.get(k) is None:
+            self._known[k] = solved(self.segments, self.build, self.plain, printed, plane)
+        return self._known[k]
 
     def cover(self, first: Vector, last: Vector, arcs: Arcs, level: int) -> list[Piece]:
         """Cover the stretch between two orbits with boxes; ``level`` says how often it was halved."""
@@ -339,7 +345,7 @@ class Tracer(Strand):
 
     def linked(self, piece: Piece, box: Box) -> Piece:
         """Return a piece with its link to the one before; from now on it is the last one."""
-        before, self.last = self.last, box
+        before, self.last, self.begun = self.last, box, self.begun or box
         if piece.proved:
             self._hold(box, None if piece.ends else (piece.start, piece.stop))
         if before is None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from flint import arb, ctx
 
 import contfric as cf
-from contfric.certify.branch import certify_branch
+from contfric.certify import tracing
+from contfric.certify.branch import certify_branch, cover
 from contfric.certify.chain import Chain, segments_of
 from contfric.certify.strand import Strand, in_phases
 from contfric.certify.tracing import Tracer
@@ -303,9 +306,111 @@ def test_where_equations_are_singular_all_along_few_boxes_are_tried() -> None:
     )
     (branch,) = (b for b in diagram.branches if np.ptp(b.values) < 1e-9 and not b.mirrored)
     tracer = Tracer(branch, [], np.inf)
-    pieces = [piece for k in range(len(branch) - 1) for piece in tracer.step(k)[0]]
+    pieces = [piece for k in range(len(branch) - 1) for piece in tracer.step(k, k + 1)[0]]
     assert tracer.ended == "" and not any(piece.proved for piece in pieces)
     assert tracer.count < 40 * len(branch)
+
+
+@pytest.mark.parametrize("start", [0.7, 0.69])
+def test_a_doubling_without_excitation_is_held_by_both_tubes(start: float) -> None:
+    """The doubled cycle, from any of its joints, is two turns of the cycle, each in a clock of its own."""
+    model = "tests/models/switched.yaml"
+    cycle = cf.find_orbit(model, {"A": start})
+    diagram = cf.explore(cycle, "A", (start, 0.74))
+    (event,) = (b for b in diagram.bifurcations if b.kind == "PD")
+    assert len(diagram.branches) == 2
+    for branch in diagram.branches:
+        found = branch.certify()
+        assert found.complete and found.events == (event.label,), (found.gaps, found.open)
+
+
+@pytest.mark.parametrize("first", range(4))
+def test_the_turns_of_a_doubled_cycle_wherever_it_begins(first: int) -> None:
+    """Joints to turns and back; the turns end at time 0, where the other one begins."""
+    cycle = cf.find_orbit("tests/models/switched.yaml", {"A": 0.7})
+    diagram = cf.explore(cycle, "A", (0.7, 0.74))
+    branch = next(b for b in diagram.branches if b[0].system.segments == 4)
+    proofs = [b.certify("A") for b in branch.bifurcations]
+    with working(80):
+        (flip,) = (f for f in Tracer(branch, proofs, np.inf).flips if f is not None)
+        order = [(first + k) % 4 for k in range(4)]
+        wraps = [int(first + k >= 4) for k in range(4)]
+        turns = replace(flip.turns, places=tuple(zip(order, map(arb, wraps), strict=True)))
+        rng = np.random.default_rng(first)
+        period, joints = 12.5, rng.normal(size=(4, 4))
+        joints[:, 0] = [-period, *np.sort(rng.uniform(-period, 0, 3))]
+        z = [arb(float(c)) for c in joints.ravel()]
+        one, other = turns.of(z)
+        absolute = joints[order, 0] + period * np.array(wraps)
+        lasts = [absolute[2] - absolute[0], absolute[0] + period - absolute[2]]
+        assert [float(-one[0]), float(-other[0])] == pytest.approx(lasts)
+        assert float(one[4] - one[0]) == pytest.approx(absolute[1] - absolute[0])
+        back = turns.joined(one, other)
+        assert max(abs(float(a - b)) for a, b in zip(back, z, strict=True)) < 1e-12
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_branch_that_starts_near_a_saddle_is_covered_from_where_its_orbits_are_alone(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A heater that hardly reaches its upper level: the period grows without bound, the boxes are few."""
+    rng = np.random.default_rng(seed)
+    params = {"outside": rng.uniform(0, 10), "tau": rng.uniform(2, 8), "low": rng.uniform(15, 20)}
+    params |= {"high": params["low"] + rng.uniform(0.5, 3), "heat": 30.0}
+    whole = cf.continue_orbit(cf.find_orbit("thermostat", params), "heat", (5.0, 32.0))
+    first = min(k for k, orbit in enumerate(whole) if orbit.period < 18 * params["tau"])
+    branch = replace(
+        whole,
+        values=whole.values[first:],
+        joints=whole.joints[first:],
+        arc=whole.arc[first:],
+        labels=whole.labels[first:],
+    )
+    monkeypatch.setattr(tracing, "_MOST", 120)  # some more than a box a step
+    found = certify_branch(branch)
+    alone = min(k for k, point in enumerate(found.points) if point.unique.proved)
+    assert alone > 0
+    pieces = [piece for piece in found.pieces if piece.start >= branch.arc[alone]]
+    assert pieces[0].start == branch.arc[alone]
+    assert all(piece.proved and piece.regular for piece in pieces)
+    assert all(piece.linked for piece in pieces[1:])
+    assert [piece.stop for piece in found.pieces[:-1]] == [p.start for p in found.pieces[1:]]
+
+
+@pytest.mark.parametrize("start", [1, 5])
+def test_parts_that_are_covered_in_another_order_are_one_curve(start: int) -> None:
+    """The same as in the order of the branch, wherever the first printed orbit that is alone is."""
+    branch = cf.continue_orbit(cf.solve_orbit("coulomb", "0s", SCENE), "Omega", (0.54, 0.58))
+    with working(80):
+        tracer = Tracer(branch, [], np.inf)
+        tracer.unique = set(range(start, len(branch)))
+        pieces = cover(tracer)
+    assert all(piece.proved and piece.regular for piece in pieces)
+    assert (pieces[0].start, pieces[-1].stop) == (branch.arc[0], branch.arc[-1])
+    for before, after in itertools.pairwise(pieces):
+        assert after.linked and after.start == before.stop
+
+
+@pytest.mark.parametrize("regular", [True, False])
+def test_after_stretches_without_boxes_only_regular_steps_are_halved(
+    regular: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where printed orbits are proved to be alone the equations are not singular: short boxes are tried."""
+    branch = cf.continue_orbit(cf.solve_orbit("coulomb", "0s", SCENE), "Omega", (0.54, 0.58))
+    longest = 0.3 * (branch.values[3] - branch.values[2])
+
+    def only_short(*given: Any) -> Box | None:
+        first, last = given[2:4]
+        return box_between(*given) if abs(float(last[-1] - first[-1])) < abs(longest) else None
+
+    monkeypatch.setattr(tracing, "box_between", only_short)
+    with working(80):
+        tracer = Tracer(branch, [], np.inf)
+        tracer.unique = {2, 3} if regular else set()
+        tracer.missed = tracing._IN_ROW
+        pieces, _ = tracer.step(2, 3)
+    assert len(pieces) == (4 if regular else 1)
+    assert all(piece.proved is regular for piece in pieces)
 
 
 def test_a_branch_is_covered_towards_an_end_that_is_not_found(
