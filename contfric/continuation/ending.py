@@ -99,8 +99,8 @@ def never_leaves(orbit: Orbit) -> bool:
     return False
 
 
-def equilibrium_met(orbit: Orbit) -> str | None:
-    r"""Return the surface on which an autonomous orbit comes to an equilibrium; None if it comes to none.
+def equilibrium_met(orbit: Orbit) -> tuple[str, str] | None:
+    r"""Return the mode at whose equilibrium an autonomous orbit arrives, and the surface; None if at none.
 
     An equilibrium of a mode is a fixed point of its flow :math:`\varphi_h` over any time h. From a state x
     it is Newton's step away from it,
@@ -124,7 +124,7 @@ def equilibrium_met(orbit: Orbit) -> str | None:
             (orbit.begins[i], orbit.itinerary[i - 1][1]),
         ):
             if _to_equilibrium(orbit, mode, joint, _PART * lasts) < _AT_EQUILIBRIUM * size:
-                return surface
+                return mode, surface
     return None
 
 
@@ -142,12 +142,18 @@ def _to_equilibrium(orbit: Orbit, mode: str, joint: FloatArray, lasts: float) ->
 
 
 def endless(orbit: Orbit) -> End | None:
-    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not."""
-    surface = equilibrium_met(orbit)
-    if surface is None:
+    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not.
+
+    Where the surface is a section, the field is the same on both sides: the orbit is homoclinic.
+    """
+    met = equilibrium_met(orbit)
+    if met is None:
         return None
-    where = f"the orbit comes to an equilibrium on the surface '{surface}' (boundary equilibrium)"
-    return End(EndReason.PERIOD, f"the period grows without bound: {where}")
+    where = f" on the surface '{met[1]}' (boundary equilibrium)"
+    if met in orbit.model.sections:
+        where = " (homoclinic)"
+    reason = f"the period grows without bound: the orbit comes to an equilibrium{where}"
+    return End(EndReason.PERIOD, reason)
 
 
 def end_at_limit(
