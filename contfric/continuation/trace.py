@@ -243,15 +243,15 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kept = side.count - count
         stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, kept, side.last)
         return stopped or overshoot is Overshoot.ENDED, step
-    if ends_at_corner(orbit, side, settings, side.count - count):
-        return True, step
-    if why == kernels.EVENT and only_lengthens(side, settings):
+    ended = ends_at_corner(orbit, side, settings, side.count - count)
+    if not ended and why == kernels.EVENT and only_lengthens(side, settings):
         side.drop_tip()
-        side.end = End(EndReason.PERIOD)
-        return True, step
-    unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
+        side.end, ended = End(EndReason.PERIOD), True
+    # what is in the last step may come first
+    unresolved = not ended and why in (kernels.EVENT, kernels.OUTSIDE)
     last, fresh = side.last - int(unresolved), side.count - count
-    if settings.stop_at and stop_among(orbit, side, settings, fresh, last):
+    stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, fresh, last)
+    if stopped or ended:
         return True, step
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest
