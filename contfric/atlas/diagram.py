@@ -394,6 +394,6 @@ class Diagram(Shown):
     def __repr__(self) -> str:
         low, high = self.range
         return (
-            f"<Diagram of {self.model.name}: {len(self.branches)} branches, {len(self.nodes)} "
-            f"bifurcations, {self.parameter} in [{low:g}, {high:g}]>"
+            f"<Diagram of {self.model.name}: {len(self.branches)} branches, "
+            f"{len(self.bifurcations)} bifurcations, {self.parameter} in [{low:g}, {high:g}]>"
         )

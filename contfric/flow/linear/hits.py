@@ -189,33 +189,26 @@ def search_hit(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, 
 def hit_of_many(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, y1):  # type: ignore[no-untyped-def]
     """Do the same for more than a few states, with the powers of their matrix that are kept."""
     entries, n, count = motion.entries_count, y0.shape[0], motion.waves_count
-    system, sight = system_in(workspace[0][1:], workspace[1], workspace[2], 0), workspace[0][0]
     taken = locked(motion.memory)
     space = 0 if taken else space_of(n, entries, count)
     memory = numbers_at(motion.memory, NUMBERS) if taken else np.zeros(space)
-    late = (memory, np.empty(pairs_space(n, count, 0)), np.empty((2 * count + 2, TERMS + 1)))
-    reach = begin_search(motion, piece, c, t, y0, dt_max, p, none, memory, system, sight)
-    found = 0.0
-    if math.isnan(reach[0]):
-        for i in range(y1.shape[0]):
-            y1[i] = reach[0]
-    else:
-        found = long_hit(
-            motion,
-            piece,
-            c,
-            target,
-            on,
-            t,
-            y0,
-            dt_max,
-            reach,
-            late,
-            system,
-            sight,
-            workspace[3],
-            y1,
-        )
+    pairs, seen = np.empty(pairs_space(n, count, 0)), np.empty((2 * count + 2, TERMS + 1))
+    late = (memory, pairs, seen)
+    found = search_long(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, late, y1)
     if taken:
         unlock(motion.memory)
     return found
+
+
+@inlined_helper
+def search_long(motion, piece, c, target, on, t, y0, dt_max, p, none, workspace, late, y1):  # type: ignore[no-untyped-def]
+    """Search in workspaces that are given: parts of them are not counted as references."""
+    system, sight = system_in(workspace[0][1:], workspace[1], workspace[2], 0), workspace[0][0]
+    reach = begin_search(motion, piece, c, t, y0, dt_max, p, none, late[0], system, sight)
+    if math.isnan(reach[0]):
+        for i in range(y1.shape[0]):
+            y1[i] = reach[0]
+        return 0.0
+    return long_hit(
+        motion, piece, c, target, on, t, y0, dt_max, reach, late, system, sight, workspace[3], y1
+    )
