@@ -52,6 +52,58 @@ def test_curve_of_a_long_period() -> None:
     assert distance(16.0) < 5e-8
 
 
+KICKED = """
+name: kicked
+states: [x, v]
+parameters: {{c: 0.3, e: {e}, d: 1.0, k: {k}}}
+autonomous: true
+surfaces: {{wall: {{observable: x, level: d}}}}
+modes: {{free: {{in: {{wall: -}}, field: {{x: v, v: x + c*v - 0.3}}}}}}
+resets: {{wall: {{v: -e*v - k}}}}
+spread: {{x: 1, v: 1}}
+"""
+
+
+def eigenvalues(c: float) -> tuple[float, float]:
+    root = math.sqrt(c * c + 4.0)
+    return (c + root) / 2.0, (c - root) / 2.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_period_grows_by_the_eigenvalue_that_is_nearer_to_zero(seed: int, tmp_path: Path) -> None:
+    """Homoclinic where the wall sends what left the saddle back to it: -e lambda_u a - k = lambda_s a.
+
+    The cycle is repelling, with c > 0: its period grows by the stable eigenvalue.
+    """
+    draw = np.random.default_rng(seed)
+    e, k = float(draw.uniform(0.5, 0.65)), float(draw.uniform(0.05, 0.12))
+    path = tmp_path / "kicked.yaml"
+    path.write_text(KICKED.format(e=e, k=k), encoding="utf-8")
+
+    def apart(c: float, e: float) -> float:
+        unstable, stable = eigenvalues(c)
+        return -e * unstable * 0.7 - k - stable * 0.7
+
+    end = float(brentq(apart, -1.0, 1.5, args=(e,), xtol=1e-15))
+    assert end > 0.05
+    orbit = cf.find_orbit(path, {"c": end + 0.03}, state=[0.98, 0.0], longest=2000)
+    ranges = {"c": (end - 1.0, end + 1.0), "e": (0.8 * e, 1.2 * e)}
+    found = cf.continue_orbit(orbit, "c", ranges["c"])
+    assert cf.EndReason.PERIOD in {side.reason for side in found.ends}
+    for period in (4.0, 8.0):  # a branch stops there, though it ends by its period in the same march
+        stopped = cf.continue_orbit(orbit, "c", ranges["c"], stop_at={"period": period})
+        assert cf.EndReason.STOP in {side.reason for side in stopped.ends}
+        assert max(stopped.period) == pytest.approx(period, abs=1e-9)
+    errors = []
+    for period in (8.0, 10.0, 12.0, 14.0):
+        curve = cf.continue_homoclinic(found, ("c", "e"), ranges, period=period)
+        c, at = curve.values[np.argmin(np.abs(curve.values[:, 1] - e))]  # where it begins
+        assert at == pytest.approx(e, abs=1e-12)
+        errors.append(c - end)
+    rates = np.log(np.array(errors[:-1]) / errors[1:]) / 2.0
+    assert rates[-1] == pytest.approx(-eigenvalues(end)[1], rel=0.03)
+
+
 def test_what_is_no_homoclinic_end_is_refused() -> None:
     with pytest.raises(cf.ParameterError, match="not one of the branch"):
         cf.continue_homoclinic(branch(), PLANE, RANGES, period=0.1)
