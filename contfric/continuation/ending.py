@@ -44,6 +44,9 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: Share of the period over which nothing but it may have changed: a saddle with complex eigenvalues makes a
 #: branch turn again and again, with folds at which nothing changes for a moment.
 _LATELY = 0.25
+#: The same where a branch has ended: a saddle that repels its cycle multiplies rounding to the size of the
+#: orbit before the parameter has been still for longer.
+AT_END = 0.1
 
 #: A parameter that changes by less than this share of the range over hundreds of points, while states are
 #: this large and grow by this factor, comes to a resonance.
@@ -268,8 +271,8 @@ def slows_down(side: Side, settings: Settings) -> bool:
     )
 
 
-def only_lengthens(side: Side, settings: Settings) -> bool:
-    """Tell whether only the period has changed along a side before its last point, by a part of itself.
+def only_lengthens(side: Side, settings: Settings, lately: float = _LATELY) -> bool:
+    """Tell whether only the period has changed along a side before its last point, by a share of itself.
 
     Next to a homoclinic orbit parameter and states differ by less than events are known to. The passage of
     the saddle multiplies rounding until no joint after it has its place: what is met there is no event.
@@ -277,7 +280,7 @@ def only_lengthens(side: Side, settings: Settings) -> bool:
     if not side.autonomous or side.last < 1:
         return False
     values, joints = (side.column(name)[:-1] for name in ("values", "joints"))
-    shorter = np.flatnonzero(-joints[:, 0, 0] < (1.0 - _LATELY) * -joints[-1, 0, 0])
+    shorter = np.flatnonzero(-joints[:, 0, 0] < (1.0 - lately) * -joints[-1, 0, 0])
     if not shorter.size:
         return False
     values, states = values[shorter[-1] :], joints[shorter[-1] :, :, 1:]

@@ -18,7 +18,14 @@ import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import endless, grows, never_leaves, only_lengthens, slows_down
+from contfric.continuation.ending import (
+    AT_END,
+    endless,
+    grows,
+    never_leaves,
+    only_lengthens,
+    slows_down,
+)
 from contfric.continuation.events_of_step import end_of_holds, resolve
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.located_event import ROUGH
@@ -201,6 +208,8 @@ def trace_side(
             may_be = side.autonomous and side.end.reason in _MAY_BE_ENDLESS
             if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
+            if side.end.reason is EndReason.SINGULAR and only_lengthens(side, settings, AT_END):
+                side.end = End(EndReason.PERIOD)
             if side.end.reason is EndReason.PERIOD:
                 _forget_unresolved(side, settings)
             side.rows = side.rows.first(side.last + 1)

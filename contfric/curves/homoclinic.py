@@ -2,9 +2,8 @@
 
 Where an orbit of an autonomous model comes to a saddle its period T grows as ``-log(distance) / lambda``,
 with the distance of the parameter and the modulus lambda of the eigenvalue of the saddle that is nearer to
-0: the unstable one if the cycle is stable, else the stable one, as an orbit that is repelled has to begin nearer
-to the saddle than the manifolds are apart. So the curve of one long period lies within a constant times
-``exp(-lambda T)`` of the curve of homoclinic orbits.
+0: the unstable one if the saddle attracts its cycle, else the stable one. So the curve of one long period
+lies within a constant times ``exp(-lambda T)`` of the curve of homoclinic orbits.
 """
 
 from __future__ import annotations

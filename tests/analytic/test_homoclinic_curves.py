@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -69,7 +70,29 @@ def eigenvalues(c: float) -> tuple[float, float]:
     return (c + root) / 2.0, (c - root) / 2.0
 
 
-@pytest.mark.parametrize("seed", range(3))
+SMOOTH = """
+name: smooth_loop
+states: [x, v]
+parameters: {mu: -0.9, b: 1.0}
+autonomous: true
+field: {x: v, v: x - x**2 + mu*v + b*x*v}
+spread: {x: 1, v: 1}
+"""
+
+
+def test_a_loop_of_a_smooth_model_has_no_boundary_equilibrium(tmp_path: Path) -> None:
+    """Its joints lie on the section on which the rate of x vanishes, as the saddle does."""
+    path = tmp_path / "smooth_loop.yaml"
+    path.write_text(SMOOTH, encoding="utf-8")
+    branch = cf.continue_orbit(cf.find_orbit(path, {}, state=[0.6, 0.0]), "mu", (-0.99, -0.5))
+    end = branch.ends[1]
+    assert end.reason is cf.EndReason.PERIOD and "boundary" not in str(end)
+    assert branch.values[-1] == pytest.approx(
+        -0.8645452474, abs=1e-9
+    )  # by shooting from the saddle
+
+
+@pytest.mark.parametrize("seed", range(4))
 def test_period_grows_by_the_eigenvalue_that_is_nearer_to_zero(seed: int, tmp_path: Path) -> None:
     """Homoclinic where the wall sends what left the saddle back to it: -e lambda_u a - k = lambda_s a.
 
@@ -90,7 +113,10 @@ def test_period_grows_by_the_eigenvalue_that_is_nearer_to_zero(seed: int, tmp_pa
     ranges = {"c": (end - 1.0, end + 1.0), "e": (0.8 * e, 1.2 * e)}
     found = cf.continue_orbit(orbit, "c", ranges["c"])
     assert cf.EndReason.PERIOD in {side.reason for side in found.ends}
-    for period in (4.0, 8.0):  # a branch stops there, though it ends by its period in the same march
+    for period in (
+        4.0,
+        8.0,
+    ):  # a branch stops there, though it ends by its period in the same march
         stopped = cf.continue_orbit(orbit, "c", ranges["c"], stop_at={"period": period})
         assert cf.EndReason.STOP in {side.reason for side in stopped.ends}
         assert max(stopped.period) == pytest.approx(period, abs=1e-9)

@@ -220,7 +220,7 @@ field: {{x: v, v: cos(w*t) - x - S*sign(v)}}
 modes: {{up: {{in: {{stop: +}}}}, down: {{in: {{stop: -}}}}}}
 resets: {{stop: {{{reset}}}}}
 """
-    with pytest.raises(cf.ModelError, match="a reset acts at 'stop' in up.*does not slide"):
+    with pytest.raises(cf.ModelError, match=r"a reset acts at 'stop' in up.*does not slide"):
         report_of(tmp_path, text)
     passes = text.replace("- S*sign(v)", "+ S")  # nothing slides there: the reset alone acts
     if reset == "v: 1":

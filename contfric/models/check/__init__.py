@@ -43,8 +43,8 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     """
     from contfric.models.check.continuity import (
         check_continuity,
-        check_jumps_through,
         check_hidden_kinks,
+        check_jumps_through,
         check_kinks_in_time,
         check_reset_jumps,
     )

@@ -34,8 +34,8 @@ _HALVINGS = 52
 
 #: This share of a line beside a jump is on one side of it, and near it.
 _ASIDE = 1e-9
-#: This share beside a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the share
-#: of a jump by which slopes may change so near it.
+#: This share beside a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
+#: share of a jump by which slopes may change so near it.
 _NEAR, _FLAT = 1e-6, 1e-2
 
 #: A line in a mode: its point (t, y) at a place.
@@ -174,9 +174,7 @@ def _with_hidden_kinks(probe: Probe) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _jumps_at(
-    values: Callable[[float], FloatArray | None], k: int, at: float, step: float
-) -> bool:
+def _jumps_at(values: Callable[[float], FloatArray | None], k: int, at: float, step: float) -> bool:
     """Tell whether a value jumps at a place, and has no pole there: it hardly changes on either side."""
     beside = [values(at + s * step) for s in (-2.0, -1.0, 1.0, 2.0)]
     known = [float(v[k]) for v in beside if v is not None]
