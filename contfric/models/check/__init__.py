@@ -43,7 +43,6 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     """
     from contfric.models.check.continuity import (
         check_continuity,
-        check_hidden_kinks,
         check_jumps_through,
         check_kinks_in_time,
         check_reset_jumps,
@@ -51,6 +50,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.filippov import check_filippov
     from contfric.models.check.hidden import check_hidden
+    from contfric.models.check.hidden_kinks import check_hidden_kinks
     from contfric.models.check.names import (
         check_constraints,
         check_kinks,

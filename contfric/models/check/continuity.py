@@ -34,10 +34,6 @@ _HALVINGS = 52
 
 #: This share of a line beside a jump is on one side of it, and near it.
 _ASIDE = 1e-9
-#: This share beside a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
-#: share of a jump by which slopes may change so near it.
-_NEAR, _FLAT = 1e-6, 1e-2
-
 #: A line in a mode: its point (t, y) at a place.
 Line = Callable[[float], tuple[float, FloatArray]]
 Sides = frozenset[tuple[str, int]]
@@ -47,7 +43,7 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
     """Check that no field and no observable jumps inside of a mode."""
     pole = _without_values(report, probe)
     for mode in probe.model.modes:
-        for name, line, low, high in _lines(probe, mode.name):
+        for name, line, low, high in lines_in(probe, mode.name):
             report.count(Topic.CONTINUITY)
             found = jump_along(partial(_values_on, probe, mode.name, line), low, high)
             if found is None:
@@ -119,7 +115,7 @@ def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
     """Warn of observables of surfaces that have a kink in time within a mode: rates locate crossings."""
     names = list(dict.fromkeys(s.observable for s in probe.model.surfaces))
     for mode in probe.model.modes if probe.period > 0.0 else ():
-        for name, line, low, high in _lines(probe, mode.name):
+        for name, line, low, high in lines_in(probe, mode.name):
             if name != "t":
                 continue
             report.count(Topic.CONTINUITY)
@@ -132,64 +128,6 @@ def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
                     "Make the place a surface, with a mode on each side",
                 )
                 return
-
-
-def check_hidden_kinks(report: ModelReport, probe: Probe) -> None:
-    """Warn of kinks of fields that no abs or sign shows, such as that of ``acos(cos(w*t))``.
-
-    Only functions whose slopes end, or jump, at some argument have such kinks: all others are left out.
-    """
-    for mode in _with_hidden_kinks(probe):
-        for name, line, low, high in _lines(probe, mode):
-            report.count(Topic.KINKS)
-            slopes = partial(_slopes_on, probe, mode, line)
-            found = jump_along(slopes, low, high)
-            if found is None or not _jumps_at(slopes, found[0], found[1], _NEAR * (high - low)):
-                continue
-            state = probe.model.states[found[0] // (1 + len(probe.model.states))]
-            report.warn(
-                Topic.KINKS,
-                f"the rate of '{state}' in mode '{mode}' has a kink along {name}, at "
-                f"{probe.shown(*line(found[1]))}, which no side of the mode decides: add a surface there "
-                "and a mode on each side; without it the kink costs accuracy",
-            )
-            return
-
-
-def _with_hidden_kinks(probe: Probe) -> list[str]:
-    """Return the modes whose fields have inverse functions or roots of what moves; none of structures."""
-    if not probe.model.definition or probe.model.composed:
-        return []
-    from contfric.models.generated.symbols import Formulas
-    from contfric.models.language.formulas import may_have_kinks
-
-    formulas = Formulas(from_text(probe.model.definition))
-    moving = (formulas.t, *formulas.y)
-    modes = [mode.name for mode in probe.model.modes for _ in formulas.pieces]
-    found = (
-        mode
-        for mode, field in zip(modes, formulas.fields, strict=True)
-        if any(may_have_kinks(rate, moving) for rate in field)
-    )
-    return list(dict.fromkeys(found))
-
-
-def _jumps_at(values: Callable[[float], FloatArray | None], k: int, at: float, step: float) -> bool:
-    """Tell whether a value jumps at a place, and has no pole there: it hardly changes on either side."""
-    beside = [values(at + s * step) for s in (-2.0, -1.0, 1.0, 2.0)]
-    known = [float(v[k]) for v in beside if v is not None]
-    if len(known) < len(beside):
-        return False
-    jump = abs(known[2] - known[1])
-    return jump > 0.0 and max(abs(known[1] - known[0]), abs(known[3] - known[2])) < _FLAT * jump
-
-
-def _slopes_on(probe: Probe, mode: str, line: Line, place: float) -> FloatArray | None:
-    """Return the derivatives of a field by time and states at a place of a line; None outside of the mode."""
-    t, y = line(place)
-    if not probe.is_in(mode, probe.signs(t, y)):
-        return None
-    return probe.slopes(mode, t, y).ravel()
 
 
 def _rates_on(
@@ -225,7 +163,7 @@ def _without_values(report: ModelReport, probe: Probe) -> bool:
     return False
 
 
-def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
+def lines_in(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
     """Yield (what changes, line, first place, last place) through a few states of a mode."""
     low, high = probe.model.region(probe.vector, 2.0)
     for time, state in probe.places(mode, _TRIED, probe.share(_STATES)):
