@@ -44,6 +44,9 @@ _LONGER, _STANDS = 1.5, 1e-6
 #: Share of the period over which nothing but it may have changed: a saddle with complex eigenvalues makes a
 #: branch turn again and again, with folds at which nothing changes for a moment.
 _LATELY = 0.25
+#: The same where a branch has ended: a saddle that repels its cycle multiplies rounding to the size of the
+#: orbit before the parameter has been still for longer.
+AT_END = 0.1
 
 #: A parameter that changes by less than this share of the range over hundreds of points, while states are
 #: this large and grow by this factor, comes to a resonance.
@@ -99,8 +102,8 @@ def never_leaves(orbit: Orbit) -> bool:
     return False
 
 
-def equilibrium_met(orbit: Orbit) -> str | None:
-    r"""Return the surface on which an autonomous orbit comes to an equilibrium; None if it comes to none.
+def equilibrium_met(orbit: Orbit) -> tuple[str, str] | None:
+    r"""Return the mode at whose equilibrium an autonomous orbit arrives, and the surface; None if at none.
 
     An equilibrium of a mode is a fixed point of its flow :math:`\varphi_h` over any time h. From a state x
     it is Newton's step away from it,
@@ -124,7 +127,7 @@ def equilibrium_met(orbit: Orbit) -> str | None:
             (orbit.begins[i], orbit.itinerary[i - 1][1]),
         ):
             if _to_equilibrium(orbit, mode, joint, _PART * lasts) < _AT_EQUILIBRIUM * size:
-                return surface
+                return mode, surface
     return None
 
 
@@ -142,12 +145,18 @@ def _to_equilibrium(orbit: Orbit, mode: str, joint: FloatArray, lasts: float) ->
 
 
 def endless(orbit: Orbit) -> End | None:
-    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not."""
-    surface = equilibrium_met(orbit)
-    if surface is None:
+    """Return the end of a branch whose orbit comes to an equilibrium on a surface; None if it does not.
+
+    Where the surface is a section, the field is the same on both sides: the orbit is homoclinic.
+    """
+    met = equilibrium_met(orbit)
+    if met is None:
         return None
-    where = f"the orbit comes to an equilibrium on the surface '{surface}' (boundary equilibrium)"
-    return End(EndReason.PERIOD, f"the period grows without bound: {where}")
+    where = f" on the surface '{met[1]}' (boundary equilibrium)"
+    if met in orbit.model.sections:
+        where = " (homoclinic)"
+    reason = f"the period grows without bound: the orbit comes to an equilibrium{where}"
+    return End(EndReason.PERIOD, reason)
 
 
 def end_at_limit(
@@ -262,8 +271,8 @@ def slows_down(side: Side, settings: Settings) -> bool:
     )
 
 
-def only_lengthens(side: Side, settings: Settings) -> bool:
-    """Tell whether only the period has changed along a side before its last point, by a part of itself.
+def only_lengthens(side: Side, settings: Settings, lately: float = _LATELY) -> bool:
+    """Tell whether only the period has changed along a side before its last point, by a share of itself.
 
     Next to a homoclinic orbit parameter and states differ by less than events are known to. The passage of
     the saddle multiplies rounding until no joint after it has its place: what is met there is no event.
@@ -271,7 +280,7 @@ def only_lengthens(side: Side, settings: Settings) -> bool:
     if not side.autonomous or side.last < 1:
         return False
     values, joints = (side.column(name)[:-1] for name in ("values", "joints"))
-    shorter = np.flatnonzero(-joints[:, 0, 0] < (1.0 - _LATELY) * -joints[-1, 0, 0])
+    shorter = np.flatnonzero(-joints[:, 0, 0] < (1.0 - lately) * -joints[-1, 0, 0])
     if not shorter.size:
         return False
     values, states = values[shorter[-1] :], joints[shorter[-1] :, :, 1:]

@@ -18,7 +18,14 @@ import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import endless, grows, never_leaves, only_lengthens, slows_down
+from contfric.continuation.ending import (
+    AT_END,
+    endless,
+    grows,
+    never_leaves,
+    only_lengthens,
+    slows_down,
+)
 from contfric.continuation.events_of_step import end_of_holds, resolve
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.located_event import ROUGH
@@ -201,6 +208,8 @@ def trace_side(
             may_be = side.autonomous and side.end.reason in _MAY_BE_ENDLESS
             if may_be and (end := endless(_tip(orbit, side, settings))):
                 side.end = end
+            if side.end.reason is EndReason.SINGULAR and only_lengthens(side, settings, AT_END):
+                side.end = End(EndReason.PERIOD)
             if side.end.reason is EndReason.PERIOD:
                 _forget_unresolved(side, settings)
             side.rows = side.rows.first(side.last + 1)
@@ -243,15 +252,15 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
         kept = side.count - count
         stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, kept, side.last)
         return stopped or overshoot is Overshoot.ENDED, step
-    if ends_at_corner(orbit, side, settings, side.count - count):
-        return True, step
-    if why == kernels.EVENT and only_lengthens(side, settings):
+    ended = ends_at_corner(orbit, side, settings, side.count - count)
+    if not ended and why == kernels.EVENT and only_lengthens(side, settings):
         side.drop_tip()
-        side.end = End(EndReason.PERIOD)
-        return True, step
-    unresolved = why in (kernels.EVENT, kernels.OUTSIDE)  # what is in the last step may come first
+        side.end, ended = End(EndReason.PERIOD), True
+    # what is in the last step may come first
+    unresolved = not ended and why in (kernels.EVENT, kernels.OUTSIDE)
     last, fresh = side.last - int(unresolved), side.count - count
-    if settings.stop_at and stop_among(orbit, side, settings, fresh, last):
+    stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, fresh, last)
+    if stopped or ended:
         return True, step
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest

@@ -1,8 +1,9 @@
 """Curves of homoclinic ends: a branch whose period grows without bound, at a long period that is fixed.
 
-Where an orbit of an autonomous model comes to a saddle its period T grows as ``-log(distance) / lambda``
-with the unstable eigenvalue lambda of the saddle. So the curve of one long period lies within a constant
-times ``exp(-lambda T)`` of the curve of homoclinic orbits.
+Where an orbit of an autonomous model comes to a saddle its period T grows as ``-log(distance) / lambda``,
+with the distance of the parameter and the modulus lambda of the eigenvalue of the saddle that is nearer to
+0: the unstable one if the saddle attracts its cycle, else the stable one. So the curve of one long period
+lies within a constant times ``exp(-lambda T)`` of the curve of homoclinic orbits.
 """
 
 from __future__ import annotations

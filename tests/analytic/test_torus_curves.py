@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,6 +96,47 @@ def test_strong_resonances_are_named_and_located(coulomb: cf.Curve) -> None:
         assert mu**power == pytest.approx([1.0, 1.0], abs=1e-9) and abs(mu[0].imag) > 0.5
         place = np.array([found[name].params[n] for n in coulomb.parameters])
         assert np.min(np.linalg.norm(coulomb.values - place, axis=1)) < 0.2
+
+
+def test_multipliers_of_an_integrated_model_by_differences(tmp_path: Path) -> None:
+    """Where a forced self-excited oscillator is no longer entrained; to R1, where the curve ends."""
+    path = tmp_path / "entrained.yaml"
+    path.write_text(
+        """
+name: entrained
+states: [x, v]
+parameters: {F: 4.0, w: 1.5, mu: 0.25}
+period: 2*pi/w
+field: {x: v, v: mu*(1 - x**2)*v - x - 0.1*x**3 + F*cos(w*t)}
+spread: {x: 3, v: 3}
+""",
+        encoding="utf-8",
+    )
+    torus = torus_of(cf.find_orbit(path, {}), "F", (0.5, 5.0))
+    curve = cf.continue_bifurcation(torus, ("w", "F"), {"w": (1.1, 1.8), "F": (0.2, 5.0)})
+    assert len(curve) > 10
+    for orbit in [*curve[:: len(curve) // 4], *(s.orbit for s in curve.special)]:
+        p, start = orbit.params, np.asarray(orbit.begins[0])
+
+        def rate(t: float, y: np.ndarray, p: dict[str, float] = p) -> list[float]:
+            damping = p["mu"] * (1 - y[0] ** 2)
+            return [y[1], damping * y[1] - y[0] - 0.1 * y[0] ** 3 + p["F"] * math.cos(p["w"] * t)]
+
+        def period(y: np.ndarray, rate=rate, start=start, end=orbit.period) -> np.ndarray:  # type: ignore[no-untyped-def]
+            span = (start[0], start[0] + end)
+            return solve_ivp(rate, span, y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+        state, h = start[1:], 1e-4
+        slopes = [(period(state + h * e) - period(state - h * e)) / (2 * h) for e in np.eye(2)]
+        mu = np.linalg.eigvals(np.column_stack(slopes))
+        assert period(state) == pytest.approx(state, abs=1e-9)
+        assert np.prod(mu) == pytest.approx(1.0, abs=1e-7)
+        both = np.sum(orbit.multipliers)
+        assert np.sum(mu) == pytest.approx(both, abs=1e-6) and abs(both) <= 2.0 + 1e-6
+    for special in curve.special:
+        trace = {"R1": 2.0, "R2": -2.0, "R3": -1.0, "R4": 0.0}[special.name]
+        assert np.sum(special.orbit.multipliers) == pytest.approx(trace, abs=1e-7)
+    assert {s.name for s in curve.special} == {"R1", "R3", "R4"}
 
 
 def test_steps_do_not_move_the_curve(coulomb: cf.Curve) -> None:

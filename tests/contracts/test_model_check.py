@@ -159,6 +159,80 @@ def test_resets_are_checked(tmp_path: Path, reset: str, says: str) -> None:
     assert not says or any(says in f.message for f in report.findings), str(report)
 
 
+FORCED = """\
+name: forced
+states: [x, v]
+parameters: {{w: {w}, z: 0.1}}
+period: 2*pi/w
+field: {{x: v, v: "cos(w*t) - 2*z*v - x + {size}*({force})"}}
+spread: {{x: 2, v: 2}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("force", "along"),
+    [
+        ("acos(cos(w*t))", "t"),
+        ("acos(cos(w*t))**2", "t"),
+        ("sqrt(sin(w*t)**2)", "t"),
+        ("(sin(w*t)**4)**0.25", "t"),
+        ("asin(sin(x))", "x"),
+        ("(x**2)**0.5", "x"),
+        ("sqrt(1 - cos(x))", "x"),
+        ("log(1 + sqrt(v**2))", "v"),
+        ("sqrt(1 + x**2)", ""),
+        ("asin(sin(x)/2)", ""),
+        ("sqrt(x**2 + z**6)", ""),
+        ("asin(tanh(x))", ""),
+        ("(x**2)**1.5", ""),
+    ],
+)
+def test_kinks_that_no_abs_shows_are_found(tmp_path: Path, force: str, along: str) -> None:
+    draw = np.random.default_rng(len(force))
+    size, w = draw.uniform(0.1, 2.0), draw.uniform(0.5, 2.0)
+    report = report_of(tmp_path, FORCED.format(size=size, w=w, force=force))
+    found = [f.message for f in report.findings if f.topic is Topic.KINKS]
+    assert report.ok and len(found) == bool(along), str(report)
+    assert not along or f"the rate of 'v' in mode 'smooth' has a kink along {along}, at" in found[0]
+
+
+@pytest.mark.parametrize(("place", "met"), [(0.5, True), (50.0, False)])
+def test_a_reset_that_no_simulation_meets_is_said(tmp_path: Path, place: float, met: bool) -> None:
+    """Of a model with one mode, and of one with several."""
+    one_mode = WALL.replace("  stop: {observable: v, level: 0}\n", "").replace(", stop: +", "")
+    one_mode = "\n".join(line for line in one_mode.splitlines() if "fall" not in line)
+    for text in (WALL, one_mode):
+        report = report_of(tmp_path, text.replace("b: 0.5", f"b: {place}"))
+        said = [f for f in report.findings if "came to the reset at 'wall'" in f.message]
+        assert report.ok and len(said) == (not met), str(report)
+        assert all(f.severity is Severity.NOTE for f in said)
+
+
+@pytest.mark.parametrize("reset", ["v: -0.5*v", "v: -0.5, from: [up]", "x: 0.9*x, to: up", "v: 1"])
+def test_sliding_where_a_reset_acts_is_refused(tmp_path: Path, reset: str) -> None:
+    text = f"""
+name: both
+states: [x, v]
+parameters: {{w: 1.0, S: 0.3}}
+period: 2*pi/w
+surfaces: {{stop: {{observable: v, sliding: filippov}}}}
+field: {{x: v, v: cos(w*t) - x - S*sign(v)}}
+modes: {{up: {{in: {{stop: +}}}}, down: {{in: {{stop: -}}}}}}
+resets: {{stop: {{{reset}}}}}
+"""
+    with pytest.raises(cf.ModelError, match=r"a reset acts at 'stop' in up.*does not slide"):
+        report_of(tmp_path, text)
+    passes = text.replace("- S*sign(v)", "+ S")  # nothing slides there: the reset alone acts
+    if reset == "v: 1":
+        assert cf.load_model(_written(tmp_path, passes)).resets
+
+
+def _written(folder: Path, text: str) -> Path:
+    path = folder / "written.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
 def test_states_that_do_nothing_are_found(tmp_path: Path) -> None:
     text = (
         GOOD.replace("states: [x, v]", "states: [x, v, z, w]")

@@ -50,6 +50,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.derivatives import check_derivatives
     from contfric.models.check.filippov import check_filippov
     from contfric.models.check.hidden import check_hidden
+    from contfric.models.check.hidden_kinks import check_hidden_kinks
     from contfric.models.check.names import (
         check_constraints,
         check_kinks,
@@ -59,7 +60,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     )
     from contfric.models.check.passages import check_passages, check_slides
     from contfric.models.check.probe import Probe
-    from contfric.models.check.reached import check_reached
+    from contfric.models.check.reached import check_reached, check_resets_met
     from contfric.models.check.scales import check_scales
     from contfric.models.check.structure import (
         check_angles,
@@ -89,6 +90,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_kinks_in_time(report, probe)
     check_reset_jumps(report, probe)
     check_kinks(report, loaded)
+    check_hidden_kinks(report, probe)
     check_reset_kinks(report, probe)
     check_sliding(report, probe)
     check_filippov(report, probe)
@@ -98,5 +100,6 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_period(report, probe)
     check_angles(report, probe)
     check_reached(report, probe)
+    check_resets_met(report, probe)
     check_scales(report, probe)
     return report

@@ -34,7 +34,6 @@ _HALVINGS = 52
 
 #: This share of a line beside a jump is on one side of it, and near it.
 _ASIDE = 1e-9
-
 #: A line in a mode: its point (t, y) at a place.
 Line = Callable[[float], tuple[float, FloatArray]]
 Sides = frozenset[tuple[str, int]]
@@ -44,7 +43,7 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
     """Check that no field and no observable jumps inside of a mode."""
     pole = _without_values(report, probe)
     for mode in probe.model.modes:
-        for name, line, low, high in _lines(probe, mode.name):
+        for name, line, low, high in lines_in(probe, mode.name):
             report.count(Topic.CONTINUITY)
             found = jump_along(partial(_values_on, probe, mode.name, line), low, high)
             if found is None:
@@ -116,7 +115,7 @@ def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
     """Warn of observables of surfaces that have a kink in time within a mode: rates locate crossings."""
     names = list(dict.fromkeys(s.observable for s in probe.model.surfaces))
     for mode in probe.model.modes if probe.period > 0.0 else ():
-        for name, line, low, high in _lines(probe, mode.name):
+        for name, line, low, high in lines_in(probe, mode.name):
             if name != "t":
                 continue
             report.count(Topic.CONTINUITY)
@@ -164,7 +163,7 @@ def _without_values(report: ModelReport, probe: Probe) -> bool:
     return False
 
 
-def _lines(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
+def lines_in(probe: Probe, mode: str) -> Iterator[tuple[str, Line, float, float]]:
     """Yield (what changes, line, first place, last place) through a few states of a mode."""
     low, high = probe.model.region(probe.vector, 2.0)
     for time, state in probe.places(mode, _TRIED, probe.share(_STATES)):

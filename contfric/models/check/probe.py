@@ -97,6 +97,16 @@ class Probe:
             return out
         return self.flow.jacobian(mode, t, y, 0.0)[:, 1 + n].copy()
 
+    def slopes(self, mode: str, t: float, y: FloatArray) -> FloatArray:
+        """Return the derivatives of these rates by time and by state, shape (n, 1 + n), from the formulas."""
+        from contfric.models.generated.build import field_of
+
+        n = len(y)
+        out, jac = np.empty(n), np.empty((n, 1 + n))
+        m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
+        field_of(self.model)(m, t, y, self.vector, none, out, jac)
+        return jac
+
     def reset(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the state after the reset at a surface."""
         return self.flow.reset(surface, t, y)

@@ -76,6 +76,22 @@ def check_reached(report: ModelReport, probe: Probe) -> None:
             )
 
 
+def check_resets_met(report: ModelReport, probe: Probe) -> None:
+    """Say at which resets no simulation arrives; where an angle begins again nobody wrote one."""
+    resets = {r.surface for r in probe.model.resets if not r.wraps}
+    motions = _motions(probe) if resets and report.ok else ()
+    if not motions:
+        return
+    names = [surface.name for surface in probe.model.surfaces]
+    met = {names[k] for motion in motions for k in np.unique(motion.exits)}
+    for surface in (name for name in names if name in resets - met):
+        report.note(
+            Topic.RESETS,
+            f"none of {len(motions)} simulations came to the reset at '{surface}' at these parameters. If "
+            "some should, correct its surface, or the modes that lie next to it",
+        )
+
+
 def _unvisited(probe: Probe) -> set[str]:
     """Return the modes that no simulation comes into.
 

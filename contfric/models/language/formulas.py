@@ -270,6 +270,17 @@ def cannot_jump(expression: Any, moving: Collection[Any]) -> bool:
     return known and all(cannot_jump(part, moving) for part in expression.args)
 
 
+def may_have_kinks(expression: Any, moving: Collection[Any]) -> bool:
+    """Tell whether a formula has a function of ``moving`` whose slope may jump without a sign that tells.
+
+    Where its argument only touches the end of what the function is defined for: ``acos(cos(t))``, and
+    ``sqrt(x**2)``, which is not simplified, as x has no sign.
+    """
+    roots = {p for p in expression.atoms(sympy.Pow) if not p.exp.is_Integer}
+    found = roots | expression.atoms(Power, sympy.asin, sympy.acos)
+    return any(part.free_symbols & set(moving) for part in found)
+
+
 def vanishes(expression: Any) -> bool:
     """Tell whether a formula is 0 everywhere.
 

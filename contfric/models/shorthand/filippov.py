@@ -51,7 +51,7 @@ def sliding_parts(
     Raises
     ------
     EntryError
-        If a surface has not a mode on each side.
+        If a surface has not a mode on each side, or a reset acts where solutions would slide.
     """
     formulas = Formulas(description)
     if description.kinks:
@@ -62,6 +62,9 @@ def sliding_parts(
     found: dict[str, Any] = {k: dict(data[k]) for k in ("observables", "surfaces", "modes")}
     pairs = [(s, above, below) for s in surfaces for above, below in _pairs(description, s)]
     slidings = [_Sliding(formulas, *pair, _name(*pair, pairs)) for pair in pairs]
+    for sliding, pair in zip(slidings, pairs, strict=True):
+        if sliding.somewhere:
+            _refuse_reset(description, *pair)
     # what all pass, as no solution is driven back to it, is crossed by what slides on others
     heights: dict[str, Any] = {}
     slid = {sliding.surface for sliding in slidings if sliding.somewhere}
@@ -77,6 +80,18 @@ def sliding_parts(
         if sliding.somewhere:
             _add(found, sliding, heights)
     return found
+
+
+def _refuse_reset(description: Description, surface: str, above: ModeText, below: ModeText) -> None:
+    """Refuse a reset at a surface in a mode next to sliding: solutions are mapped before they slide."""
+    both = (above.name, below.name)
+    acts = [mode for mode in both if mode in description.acts.get(surface, both)]
+    if surface in description.resets and acts:
+        raise EntryError(
+            ("surfaces", surface, SLIDING),
+            f"a reset acts at '{surface}' in {' and '.join(acts)}: a solution that meets the surface is "
+            "mapped, and does not slide. Leave out one of the two",
+        )
 
 
 def _crossing(
