@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.base.lazy import lazily
 
 if TYPE_CHECKING:
+    from contfric.adding.windows import Window as Window
+    from contfric.adding.windows import period_adding as period_adding
     from contfric.atlas.diagram import Diagram as Diagram
     from contfric.atlas.explore import explore as explore
     from contfric.atlas.plane import Plane as Plane
@@ -84,8 +86,6 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit as Orbit
     from contfric.orbit.resting_positions import RestingPosition as RestingPosition
     from contfric.orbit.solve import solve_orbit as solve_orbit
-    from contfric.period_adding.windows import Window as Window
-    from contfric.period_adding.windows import period_adding as period_adding
     from contfric.quantities.registry import quantity_names as quantity_names
     from contfric.response.basin_map import basins as basins
     from contfric.response.basins import Basins as Basins

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import contfric as cf
+from contfric.adding.windows import Window
 from contfric.censuses.result import Census
-from contfric.period_adding.windows import Window
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 

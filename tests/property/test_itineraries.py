@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.period_adding import two_orbit_itineraries as itineraries
-from contfric.period_adding.release_map import Samples, sampled
+from contfric.adding import two_orbit_itineraries as itineraries
+from contfric.adding.release_map import Samples, sampled
 
 LONGEST = 7
 

@@ -7,7 +7,7 @@ follows the arithmetic of a circle map (period adding: V. Avrutin et al., Contin
 Piecewise-Smooth One-Dimensional Maps, World Scientific 2019, chapter 3).
 
 Itineraries that the return map of the release excludes are not tried
-(:mod:`contfric.period_adding.two_orbit_itineraries`).
+(:mod:`contfric.adding.two_orbit_itineraries`).
 
 Each itinerary is an ordinary boundary-value problem, solved from the two orbits run through one after the
 other: at the pinned stop their states nearly agree. The problem has a solution also where it is not
@@ -23,6 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.adding.two_orbit_itineraries import itineraries_with_ranges
 from contfric.base.arrays import FloatArray
 from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
@@ -36,7 +37,6 @@ from contfric.events.bifurcation import Bifurcation
 from contfric.events.candidates import candidates
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
-from contfric.period_adding.two_orbit_itineraries import itineraries_with_ranges
 from contfric.signature.edits import concatenate
 
 #: Places over the gap at which the margins of an itinerary are looked at: they are smooth curves there, with

@@ -1,6 +1,6 @@
 """Which itineraries over two orbits can have a window: a necessary condition from the map of their release.
 
-Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.period_adding.release_map`). Its
+Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.adding.release_map`). Its
 release is then in
 
     I(w_1 ... w_k) = F_{w_k}(I(w_1 ... w_{k-1}) on the side of w_k),      I() = D.
@@ -26,10 +26,10 @@ from itertools import product
 
 import numpy as np
 
+from contfric.adding.release_map import Samples, sampled
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
-from contfric.period_adding.release_map import Samples, sampled
 from contfric.signature.cyclic import least_rotation, primitive_length
 
 #: Parts of a range between two sampled parameters, each with its own intervals.
