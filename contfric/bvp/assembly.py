@@ -53,7 +53,8 @@ class Assembly:
 
     @cached_property
     def names(self) -> list[str]:
-        """The surfaces of the model: of one whose modes come as they are visited those until now."""
+        """The surfaces of the model: where modes come as they are visited those of the orbit have been."""
+        _ = self.inside, self.entries, self.ending  # modes are visited in this order
         return [surface.name for surface in self.model.surfaces]
 
     @cached_property
@@ -95,6 +96,16 @@ class Assembly:
         return [
             self._ends_in(*pair, after)
             for pair, after in zip(self.itinerary, self.after, strict=True)
+        ]
+
+    @cached_property
+    def ending(self) -> list[dict[str, int]]:
+        """The sides of surfaces on which each segment ends."""
+        return [
+            ending_sides(self.model, mode, exit_, after, inside)
+            for (mode, exit_), after, inside in zip(
+                self.itinerary, self.after, self.inside, strict=True
+            )
         ]
 
     def _ends_in(self, mode: str, surface: str, after: str) -> tuple[str, ...]:
@@ -145,12 +156,11 @@ class Assembly:
     @cached_property
     def joint(self) -> list[tuple[int, ...]]:
         """Rows of the joint margins."""
-        model, rows = self.model, list[tuple[int, ...]]()
+        rows = list[tuple[int, ...]]()
         pinned = {(hold.segment - 1, hold.pin) for hold in self.holds}
-        for i, (mode, exit_) in enumerate(self.itinerary):
-            ending = ending_sides(model, mode, exit_, self.after[i], self.inside[i])
+        for i, (_, exit_) in enumerate(self.itinerary):
             for k, surface in enumerate(self.names):
-                sign = ending.get(surface, 0)
+                sign = self.ending[i].get(surface, 0)
                 if sign and surface != exit_ and (i, surface) not in pinned:
                     rows.append((i, k, sign, 0))
         return rows
