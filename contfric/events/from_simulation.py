@@ -66,17 +66,16 @@ def solutions_near(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> 
     own, seen = canonical_itinerary(orbit.itinerary, orbit.model), set()
     start = _inside(orbit)
     parts = (False, True) if orbit.symmetric else (False,)
-    starts = _starts_near(orbit, start[1], shifts)
-    for (size, vector, state), half in product(starts, parts):
+    starts = tuple(_starts_near(orbit, start[1], shifts))
+    for half, (size, vector, state) in product(parts, starts):  # what is seen comes first
         found = _one_turn(orbit, start, vector, state, half)
         if found is not None and size == np.inf:
             found = _without_creep(orbit, found, start, state) or found
         if found is None:
             continue
         itinerary = canonical_itinerary(found.itinerary, orbit.model)
-        if (
-            itinerary != own and (itinerary, size) not in seen
-        ):  # from another distance it is another guess
+        # from another distance it is another guess
+        if itinerary != own and (itinerary, size) not in seen:
             seen.add((itinerary, size))
             yield _where_orbit_is(orbit, found)
 

@@ -41,7 +41,6 @@ from contfric.flow.oscillator.motion import (
     S,
     direction,
     excitation,
-    harmonic,
     phases,
     point,
 )
@@ -82,11 +81,8 @@ def parameter_slope(index, s, p, t0, x0, v0, d, own, one, three):  # type: ignor
     if index == S:
         return -s * own[2], -s * own[0]
     if index == H:
-        w = 3 * p[OMEGA]
-        if h == 0.0 and p[ZETA] == 0.0:
-            three = harmonic(w, math.sin(w * t0), math.cos(w * t0), d)
-        elif h == 0.0:
-            three = forced(p[ZETA], w, w * t0, d)
+        if h == 0.0:
+            three = forced(p[ZETA], 3 * p[OMEGA], 3 * p[OMEGA] * t0, d)
         return three[0], three[1]
     if index == ZETA:
         return damping_slope(s, p, t0, x0, v0, d, own, one, three)
