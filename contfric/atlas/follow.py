@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 from contfric.atlas.collect import Event
 from contfric.atlas.crossings import follow_crossing, whole_branch
@@ -153,7 +154,9 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
     asked: list[Branch] = []
-    for found in solutions_near(orbit.as_whole(), shifts):
+    for found in chain(
+        solutions_near(orbit.as_whole(), shifts), _of_half_turns(orbit, shifts, done)
+    ):
         guess = replace(found, vector=orbit.vector)
         itinerary = canonical_itinerary(guess.itinerary, orbit.model)
         if itinerary in done:
@@ -178,6 +181,14 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     )
     if creeps and alone and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
+
+
+def _of_half_turns(
+    orbit: Orbit, shifts: tuple[tuple[int, float], ...], done: set[Itinerary]
+) -> Iterator[Orbit]:
+    """Yield what solutions do in half a turn near a symmetric orbit, where no whole turn leads anywhere."""
+    if orbit.symmetric and not done:
+        yield from solutions_near(orbit.as_whole(), shifts, half=True)
 
 
 def _meeting(

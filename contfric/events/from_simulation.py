@@ -4,7 +4,7 @@ Where the flow is continuous at an event (static and kinetic limit agree, a graz
 met at once), solutions near the orbit at the event have its itinerary or that of the orbit that takes over.
 So motions that start near it are followed for one turn, and each itinerary that is new is proposed. Near a
 symmetric orbit few of them do the same in both halves of a turn: what they do in one half, and its mirror
-image, is proposed, too. It takes no knowledge of the event, and finds nothing where what follows repels too
+image, can be asked for. It takes no knowledge of the event, and finds nothing where what follows repels too
 fast to be simulated.
 """
 
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
@@ -53,7 +52,9 @@ _KEPT = 1e-6
 _LEFT = 1e-9
 
 
-def solutions_near(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> Iterator[Orbit]:
+def solutions_near(
+    orbit: Orbit, shifts: tuple[tuple[int, float], ...] = (), half: bool = False
+) -> Iterator[Orbit]:
     """Yield orbits, not solved, with the itineraries of solutions near an orbit over one turn.
 
     The same itinerary may come again, as a guess from a solution farther away.
@@ -62,12 +63,11 @@ def solutions_near(orbit: Orbit, shifts: tuple[tuple[int, float], ...] = ()) -> 
     ----------
     orbit : the orbit at the event, on its whole cycle
     shifts : (parameter, change) of further solutions, from the orbit itself at other parameters
+    half : of half a turn, and its mirror image, near a symmetric orbit
     """
     own, seen = canonical_itinerary(orbit.itinerary, orbit.model), set()
     start = _inside(orbit)
-    parts = (False, True) if orbit.symmetric else (False,)
-    starts = tuple(_starts_near(orbit, start[1], shifts))
-    for half, (size, vector, state) in product(parts, starts):  # what is seen comes first
+    for size, vector, state in _starts_near(orbit, start[1], shifts):
         found = _one_turn(orbit, start, vector, state, half)
         if found is not None and size == np.inf:
             found = _without_creep(orbit, found, start, state) or found

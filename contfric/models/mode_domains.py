@@ -41,8 +41,11 @@ def _met(model: Model) -> dict[str, tuple[str, ...]]:
 def open_ends(model: Model, mode: str) -> tuple[str, ...]:
     """Return surfaces that a mode lies on one side of, with nothing behind: a solution ends there.
 
-    Not those behind another level of the same observable, which is met first.
+    Not those behind another level of the same observable, which is met first. Chatter lies on its wall, and
+    ends where the wall lets go.
     """
+    if mode in model.chatter_by_mode:
+        return ()
     own, found = [d for d in model.domains if d.own_mode == mode], []
     for surface in (s.name for s in model.surfaces if s.name not in _met(model)[mode]):
         sides = {d.signs[surface] for d in own}
