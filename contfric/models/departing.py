@@ -119,7 +119,7 @@ def limit_departures(
             if all(d is not None and d.where == through for d in first):
                 continue  # they were asked of this limit
             apart = [_mode_at(modes, regions, on[0], side) for side in (1, -1)]
-            # where other surfaces divide the modes beside it, each region is asked
+            # where other surfaces divide the modes at its sides, each region is asked
             for asked in [known] if all(apart) else regions:
                 beyond = {**asked, **through}
                 inside = {**beyond, limit: known[limit]}
@@ -316,8 +316,8 @@ def _left_by_tangency(
     """Return true where a limit that is met nowhere is the rate of a side: nothing if it is not."""
     for rest in (d for d in at.values() if d.signs[on] == 0 and d.signs[limit] != 0):
         beyond = {**rest.signs, limit: -rest.signs[limit]}
-        beside = [at.get(tuple(sorted({**beyond, on: side}.items()))) for side in (1, -1)]
-        apart = [d.mode for d in beside if d is not None]
+        sides = [at.get(tuple(sorted({**beyond, on: side}.items()))) for side in (1, -1)]
+        apart = [d.mode for d in sides if d is not None]
         if len(apart) == 2 and _vanishing_side(sampler, rest.signs, (on, limit), apart):
             return {True}
     return set()

@@ -32,7 +32,7 @@ _LOOKED_INTO, _LEFT = 1e-4, 1e-6
 #: Halvings: to the resolution of the arithmetic.
 _HALVINGS = 52
 
-#: This share of a line beside a jump is on one side of it, and near it.
+#: This share of a line next to a jump is on one side of it, and near it.
 _ASIDE = 1e-9
 #: A line in a mode: its point (t, y) at a place.
 Line = Callable[[float], tuple[float, FloatArray]]

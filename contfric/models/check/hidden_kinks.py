@@ -12,7 +12,7 @@ from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.describe import from_text
 
-#: This share beside a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
+#: This share next to a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
 #: share of a jump by which slopes may change so near it.
 _NEAR, _FLAT = 1e-6, 1e-2
 
@@ -64,9 +64,9 @@ def _with_hidden_kinks(probe: Probe) -> list[str]:
 
 def _jumps_at(values: Callable[[float], FloatArray | None], k: int, at: float, step: float) -> bool:
     """Tell whether a value jumps at a place, and has no pole there: it hardly changes on either side."""
-    beside = [values(at + s * step) for s in (-2.0, -1.0, 1.0, 2.0)]
-    known = [float(v[k]) for v in beside if v is not None]
-    if len(known) < len(beside):
+    around = [values(at + s * step) for s in (-2.0, -1.0, 1.0, 2.0)]
+    known = [float(v[k]) for v in around if v is not None]
+    if len(known) < len(around):
         return False
     jump = abs(known[2] - known[1])
     return jump > 0.0 and max(abs(known[1] - known[0]), abs(known[3] - known[2])) < _FLAT * jump

@@ -18,7 +18,7 @@ from contfric.models.definition import Domain, Model, Reset, Surface
 _ON_SURFACE, _EVERYWHERE = 200, 400
 #: With a gradient this small a place on the surface is known to 1e-6 only (12 digits of the observable).
 _FLAT = 1e-6
-#: At a double root a place is known to 1e-6, and so is the gradient: this far beside it is a thousand times
+#: At a double root a place is known to 1e-6, and so is the gradient: this far from it is a thousand times
 #: larger. That of a surface which is crossed is not a hundred times larger there.
 _BESIDE, _VANISHES = 1e-3, 1e-2
 #: A rate this small is one that rounding has made.
@@ -59,8 +59,8 @@ def _is_flat(probe: Probe, surface: str, t: float, y: FloatArray) -> bool:
     if not size > _FLAT:
         return True
     step = _BESIDE * slope / np.linalg.norm(slope)
-    beside = [probe.slope(surface, t + s * step[0], y + s * step[1:]) for s in (1.0, -1.0)]
-    return size < _VANISHES * float(np.abs(beside).max())
+    around = [probe.slope(surface, t + s * step[0], y + s * step[1:]) for s in (1.0, -1.0)]
+    return size < _VANISHES * float(np.abs(around).max())
 
 
 def _ends_derived(model: Model, surface: Surface) -> bool:
