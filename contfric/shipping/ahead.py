@@ -26,8 +26,8 @@ Progress = Callable[[str], None]
 _MARK = "@kernel("
 #: Kernels that share most of their helpers are compiled in one process, where a helper is typed once; the
 #: groups that take longest first.
-_GROUPS = (
-    ("orbit", "continuation", "curves"),
+GROUPS = (
+    ("bvp", "simulation", "orbit", "continuation", "curves"),
     ("flow.general.*-plain",),
     ("flow.general.*-stiff",),
     ("chaos",),
@@ -138,10 +138,10 @@ def duration(names: Sequence[str], workers: int | None = None) -> str:
 
 def _group(name: str) -> int:
     short = name.removeprefix("contfric.")
-    for k, patterns in enumerate(_GROUPS):
+    for k, patterns in enumerate(GROUPS):
         if any(fnmatch(short, f"{pattern}*") for pattern in patterns):
             return k
-    return len(_GROUPS)
+    return len(GROUPS)
 
 
 def _compile(names: list[str]) -> None:

@@ -8,6 +8,7 @@ import math
 import os
 import subprocess
 import sys
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numba
@@ -23,6 +24,7 @@ from contfric.compiling import announced
 from contfric.compiling.inlined import part_options
 from contfric.models.describe import describe
 from contfric.models.generated import build
+from contfric.shipping import ahead
 from contfric.shipping.ahead import every_kernel
 
 PACKAGE = Path(cf.__file__).parent
@@ -253,6 +255,14 @@ def test_a_slower_machine_multiplies_the_times_of_the_table(fresh_cache):
 
 def test_every_time_of_the_table_is_of_a_kernel():
     assert announced.SECONDS.keys() <= every_kernel().keys()
+
+
+def test_every_group_that_is_compiled_in_one_process_has_kernels():
+    short = [name.removeprefix("contfric.") for name in every_kernel()]
+    for patterns in ahead.GROUPS:
+        for pattern in patterns:
+            of_models = pattern.startswith("contfric_model_")
+            assert of_models or any(fnmatch(name, f"{pattern}*") for name in short), pattern
 
 
 def _returned(function: ast.FunctionDef) -> set[str]:
