@@ -212,12 +212,6 @@ class PointRows:
         )
 
     @property
-    def _of_points(self) -> tuple[Any, ...]:
-        """The arrays in the order of a point's fields, up to the arclength."""
-        own = self.joints, self.w, self.tangents, self.directions
-        return (*own, self.tests, self.labels, self.mu)
-
-    @property
     def values(self) -> FloatArray:
         """The parameter of a branch, one value a row."""
         return self.w[:, 0]
@@ -234,19 +228,38 @@ class PointRows:
 
     def point(self, k: int) -> Point:
         """Return one row as a point of its own."""
-        row = [*(array[k].copy() for array in self._of_points), float(self.arc[k])]
-        return Point(*row)
+        return Point(
+            self.joints[k].copy(),
+            self.w[k].copy(),
+            self.tangents[k].copy(),
+            self.directions[k].copy(),
+            self.tests[k].copy(),
+            self.labels[k].copy(),
+            self.mu[k].copy(),
+            float(self.arc[k]),
+        )
 
     def only(self) -> Point:
         """Return the first row as a point that shares the arrays: of rows that nothing else is written to."""
-        row = [*(array[0] for array in self._of_points), float(self.arc[0])]
-        return Point(*row)
+        return self._shared(0)
 
     def points(self, start: int, stop: int) -> list[Point]:
         """Return rows as points of their own, which share one copy of each array."""
-        copies = [array[start:stop].copy() for array in self._of_points]
-        arc = self.arc[start:stop].tolist()
-        return [Point(*row) for row in zip(*copies, arc, strict=True)]
+        rows = PointRows(*[array[start:stop].copy() for array in vars(self).values()])
+        return [rows._shared(k) for k in range(stop - start)]
+
+    def _shared(self, k: int) -> Point:
+        """Return one row as a point that shares the arrays."""
+        return Point(
+            self.joints[k],
+            self.w[k],
+            self.tangents[k],
+            self.directions[k],
+            self.tests[k],
+            self.labels[k],
+            self.mu[k],
+            float(self.arc[k]),
+        )
 
     def put(self, k: int, point: Point) -> None:
         """Write a point to one row."""

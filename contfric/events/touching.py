@@ -153,12 +153,10 @@ def is_rate_of(model: Model, mode: str, exit_: str, surface: str) -> bool:
     return bool(factor and np.allclose(rates, factor * values, rtol=1e-9, atol=1e-12))
 
 
-def rate_along(orbit: Orbit, mode: str, surface: str, joint: np.ndarray) -> float:
+def rate_along(orbit: Orbit, mode: str, surface: str, joint: FloatArray) -> float:
     """Rate of a surface's observable along a mode at a joint (t, y)."""
     observable = orbit.model.surface_by_name[surface].observable
-    time, n = float(joint[0]), len(joint) - 1
-    grad = orbit.flow.gradient(observable, time, joint[1:])
-    return float(grad[0] + grad[1:] @ orbit.flow.jacobian(mode, time, joint[1:], 0.0)[:, 1 + n])
+    return orbit.flow.rate(mode, observable, float(joint[0]), joint[1:])
 
 
 @lru_cache(maxsize=8)  # an event asks for its kind and its accuracy, at one orbit
@@ -169,13 +167,13 @@ def rate_scale(orbit: Orbit, mode: str, surface: str) -> float:
     the surface in a period.
     """
     flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
-    phases = range(1 if orbit.model.autonomous else _PHASES)
-    largest = 0.0
+    period, largest = orbit.period, 0.0
+    phases = [0.0] if orbit.model.autonomous else [k / _PHASES * period for k in range(_PHASES)]
     for end in orbit.ends:
         time, y = float(end[0]), end[1:]
-        times = [time + k / _PHASES * orbit.period for k in phases]
-        rates = [abs(flow.rate(mode, observable, t, y)) for t in times]
-        largest = max(largest, abs(flow.height(surface, time, y)) / orbit.period, *rates)
+        largest = max(largest, abs(flow.height(surface, time, y)) / period)
+        for phase in phases:
+            largest = max(largest, abs(flow.rate(mode, observable, time + phase, y)))
     return largest
 
 
