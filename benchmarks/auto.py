@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bench_engine import branch_in_default_steps, branch_of
-from gate import LOOP, spent, turn_of_yardstick
+from gate import compiled_yardstick, spent
 from origin import origin
 
 import contfric as cf
@@ -223,7 +223,7 @@ def main() -> int:
     if auto is None or shutil.which("gfortran") is None:
         print("AUTO_DIR is not set, or gfortran is not there: nothing is compared", file=sys.stderr)
         return 0
-    turn_of_yardstick(LOOP)
+    compiled_yardstick()
     with tempfile.TemporaryDirectory() as folder:
         pairings = [problem(Path(folder), Path(auto)) for problem in (friction, duffing)]
         tables = [table(pairing, measured(pairing)) for pairing in pairings]

@@ -7,7 +7,7 @@ import platform
 import subprocess
 from pathlib import Path
 
-from gate import LOOP, spent, turn_of_yardstick
+from gate import compiled_yardstick, spent
 
 #: Turns of the yardstick of which the least is given.
 TURNS = 25
@@ -32,8 +32,8 @@ def commit() -> str:
 
 def origin() -> str:
     """Return commit, machine and yardstick as a part of a sentence."""
-    turn_of_yardstick(LOOP)
-    yard = min(spent(lambda: turn_of_yardstick(LOOP)) for _ in range(TURNS))
+    compiled_yardstick()
+    yard = min(spent(compiled_yardstick) for _ in range(TURNS))
     return (
         f"commit {commit()}, {platform.machine()}, {os.cpu_count()} processors, "
         f"Python {platform.python_version()}; the yardstick of `make gate` takes {yard * 1e3:.2f} ms"
