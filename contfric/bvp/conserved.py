@@ -13,7 +13,7 @@ A velocity that is 0 as long as a contact sticks is no datum: the surface that a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -33,6 +33,8 @@ _NOTHING = 1e-12
 _MORE = 3
 #: States that are tried for them.
 _TRIES = 200
+#: Itineraries whose directions are kept: an event asks again for those of all that can follow it.
+_ITINERARIES = 512
 #: A second set of parameters: what vanishes at the defaults alone is no datum.
 _MOVED = 1.07
 
@@ -42,18 +44,22 @@ def conserved(model: Model, itinerary: Itinerary) -> FloatArray:
 
     Orthonormal rows, shape (k, n).
     """
-    n = len(model.states)
     if not model.definition:  # of functions of its own: such a model says nothing of its fields
-        return np.empty((0, n))
-    modes = dict.fromkeys(mode for mode, _ in itinerary)
-    still = np.eye(n)
+        return np.empty((0, len(model.states)))
+    resets = (exit_ for mode, exit_ in itinerary if model.reset_at(mode, exit_) is not None)
+    modes = (mode for mode, _ in itinerary)
+    return _by_modes(model, tuple(dict.fromkeys(modes)), tuple(dict.fromkeys(resets)))
+
+
+@lru_cache(maxsize=_ITINERARIES)
+def _by_modes(model: Model, modes: tuple[str, ...], resets: tuple[str, ...]) -> FloatArray:
+    """Return the directions that some modes and the resets at some surfaces conserve."""
+    still = np.eye(len(model.states))
     for mode in modes:
         still = _kept(still, _along(model, mode)[0])
         if not len(still):
             return still
-    for surface in dict.fromkeys(
-        exit_ for mode, exit_ in itinerary if model.reset_at(mode, exit_) is not None
-    ):
+    for surface in resets:
         still = _kept(still, _jumps(model, surface))
     places = np.hstack([_along(model, mode)[1] for mode in modes])
     own, sizes, _ = np.linalg.svd(still @ places, full_matrices=False)

@@ -248,11 +248,13 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         return continuous
     for location in locations_of(bifurcation)[:1]:
         try:
-            outcome_at(orbit.as_whole(), location, kind)
+            follows = outcome_at(orbit.as_whole(), location, kind).edit
         except NoJump:
             return continuous
         except NotationError:  # what is there instead is told by what follows
             return ""
+        if not follows.holds:
+            return continuous
     return ""
 
 

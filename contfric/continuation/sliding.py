@@ -130,13 +130,26 @@ def _first_located(
             share[k] = left / (left - last)
     best: tuple[float, int, Point] | None = None
     for k in sorted(share, key=share.__getitem__):
-        change = float(before.tests[k] - after.tests[k])
-        if best is not None and not best[2].lost and best[2].tests[k] > _BEHIND * change:
+        if best is not None and _is_behind(orbit, before, best[2], after, (best[1], k)):
             continue
         point = locate_change(orbit, before, after, settings, BY_TEST, k)
         if point is not None and (best is None or (point.arc, k) < best[:2]):
             best = point.arc, k, point
     return None if best is None else best[1:]
+
+
+def _is_behind(
+    orbit: Orbit, before: Point, point: Point, after: Point, pair: tuple[int, int]
+) -> bool:
+    """Tell whether where the first of two margins vanishes the other one vanishes later, or just there.
+
+    It is infinite there if the stationary point at which it is violated does not exist yet. What vanishes
+    just there is the same on the other half of an orbit that is symmetric but for where its contacts stick.
+    """
+    first, k = (orbit.system.tests[i] for i in pair)
+    left, change = float(point.tests[pair[1]]), float(before.tests[pair[1]] - after.tests[pair[1]])
+    just_there = first.margin is k.margin and -_NEGATIVE < left < _TOGETHER * change
+    return not point.lost and (left == np.inf or left > _BEHIND * change or just_there)
 
 
 def _pulled_in(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from contfric.base.arrays import FloatArray
 from contfric.errors import NotationError
+from contfric.events.touching import is_rate_of
 from contfric.events.zero_acceleration import leaving_rate
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.simulation.starts import signs_at
 
@@ -17,10 +21,32 @@ class NoJump(NotationError):
     """Nothing can be held at an event: the solution there is continuous."""
 
 
+@cache
+def left_at_rest(model: Model, rest: str, departs: str) -> bool:
+    """Tell whether rest is left to a mode without acceleration: the solution does not jump where it begins.
+
+    So it is everywhere in some models. In others there are contacts that jump, and Jenkins elements that do
+    not: the stretch of one that slips rests at its limit until its rate, the velocity, vanishes.
+    """
+    if model.filippov:
+        return True
+    leaves = [
+        is_rate_of(model, model.domain_by_name[target].mode, on, back)
+        for domain in model.domains_of(rest)
+        for on in (name for name, side in domain.signs.items() if side == 0)
+        if not model.lies_on(departs, on)
+        for back, target in model.exits_of(domain.name)
+        if not model.lies_on(model.domain_by_name[target].mode, on)
+    ]
+    return bool(leaves) and all(leaves)
+
+
 def check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
     """Check that rest would be left with an acceleration: only then can it be held."""
-    jumps = not orbit.model.filippov  # else a rate is rounding, however large
-    if departs is not None and not (jumps and leaving_rate(orbit, rest, departs, joint) > NO_JUMP):
+    if departs is not None and (
+        left_at_rest(orbit.model, rest, departs)  # a rate is rounding, however large
+        or leaving_rate(orbit, rest, departs, joint) <= NO_JUMP
+    ):
         raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
 
 

@@ -44,7 +44,7 @@ from contfric.errors import NotationError
 from contfric.events import standing_slides as slides
 from contfric.events.bifurcation import Kind
 from contfric.events.contact_outcomes import continuous_edit
-from contfric.events.holdable import NoJump, check_held, check_inside, rest_mode
+from contfric.events.holdable import NoJump, check_held, check_inside, left_at_rest, rest_mode
 from contfric.events.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.events.zero_acceleration import (
     first_zero_acceleration,
@@ -200,7 +200,7 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
     j = (i + 1) % len(itinerary)
     touch = touch_of(orbit, i, location.surface)
     departs = _released(model, mode, location.surface)
-    if model.filippov:
+    if left_at_rest(model, mode, departs):
         return Successor(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
     check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
@@ -239,7 +239,7 @@ def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:
     mode, exit_ = orbit.itinerary[i]
     touch = touch_of(orbit, i, location.surface)
     rest = rest_mode(orbit, i, location.surface)
-    if orbit.model.filippov:
+    if left_at_rest(orbit.model, rest, mode):
         return Successor(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
     check_inside(orbit, rest, touch)
     edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))

@@ -16,7 +16,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
 from contfric.events.contact_outcomes import Joints, Speeds
-from contfric.events.holdable import NO_JUMP, NoJump
+from contfric.events.holdable import NO_JUMP, NoJump, left_at_rest
 from contfric.events.touching import rate_along
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
@@ -74,7 +74,10 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     lasts = orbit.durations[j]
     before, behind = itinerary[j - 1][0], itinerary[(j + 1) % len(itinerary)][0]
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
-    return orbit.model.filippov and same and bool(lasts < _TOUCHES * time_unit(orbit))
+    short = bool(lasts < _TOUCHES * time_unit(orbit))
+    pairs = (itinerary[j][0], before), (before, itinerary[j][0])
+    rests = any(left_at_rest(orbit.model, rest, beside) for rest, beside in pairs)
+    return same and short and rests
 
 
 def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, Joints, str]:

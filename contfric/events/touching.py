@@ -111,7 +111,16 @@ def _resting(model: Model, mode: str, exit_: str, surface: str) -> tuple[Domain,
     others = [
         d for d in resting if d.signs.get(exit_) == 0 and _ends_rest(model, d, surface, exit_)
     ]
-    return (*own, *others)
+    before = model.domains_of(mode)
+    reached = {name for d in before for name in model.targets.get((d.name, exit_), ())}
+    on = {exit_, *(name for name, sign in before[0].signs.items() if sign == 0)}
+
+    def unlike(domain: Domain) -> tuple[bool, int]:
+        """Return how a rest is unlike the mode: an element that slips does so, too, where a contact stops."""
+        lain_on = {name for name, sign in domain.signs.items() if sign == 0}
+        return domain.name not in reached, len(lain_on ^ on)
+
+    return (*own, *sorted(others, key=unlike))
 
 
 def _near(model: Model, mode: str, exit_: str) -> Iterable[Domain]:

@@ -61,6 +61,12 @@ class Edit:
             {**self.inserted, **other.inserted},
         )
 
+    @property
+    def holds(self) -> bool:
+        """Whether a hold comes in, or a segment becomes one."""
+        comes = (exit_ for pairs in self.inserted.values() for _, exit_ in pairs)
+        return any(map(is_hold, (*self.renamed.values(), *comes)))
+
     def _touched(self) -> frozenset[int]:
         return self.dropped | frozenset(self.renamed) | frozenset(self.inserted)
 
