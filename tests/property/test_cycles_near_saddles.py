@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas.exploration import Exploration
 from contfric.continuation.ending import lost_in_end
+from contfric.continuation.points import settings_of
 from contfric.orbit.repetition import shortest
 
 MODEL = Path(__file__).resolve().parents[1] / "models" / "switched.yaml"
@@ -74,3 +76,28 @@ def test_events_are_lost_in_an_endless_period_by_value_and_by_states(seed: int) 
     assert lost_in_end(moved(end, 0.5e-8 * width), end, "A", width)
     assert not lost_in_end(moved(end, 2e-8 * width), end, "A", width)
     assert not lost_in_end(moved(event.orbit, 0.0), end, "A", width)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_events_of_one_branch_are_told_apart_however_well_they_are_known(seed: int) -> None:
+    """Two branches may have the same event; one branch has others, one after the other, and some twice."""
+    rng = np.random.default_rng([628, seed])
+    low, high = (0.83, 0.9)
+    begun = cf.find_orbit(MODEL, {"A": 0.85, "C": 0.8}, longest=1000)
+    settings = settings_of(begun, "A", (low, high), None, True, 100)
+    kind = (cf.Kind.SN, cf.Kind.PD)[seed % 2]
+    rise = 10.0 ** rng.uniform(-7.5, -6.0) * (high - low)
+    one = cf.Bifurcation(kind, begun.params, begun, bound=1e-6)
+    near = begun.vector.copy()
+    near[begun.model.index_of("A")] += rise
+    other = replace(begun, vector=near)
+    next_one = cf.Bifurcation(kind, other.params, other, bound=1e-6)
+    for events, branches, count in (
+        ((one, next_one), (0, 0), 2),
+        ((one, next_one), (0, 1), 1),
+        ((one, one), (0, 0), 1),
+    ):
+        state = Exploration(settings, 2, 1, 100, True, None)
+        for event, branch in zip(events, branches, strict=True):
+            state._meet(event, branch)
+        assert len(state.events) == count
