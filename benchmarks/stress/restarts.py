@@ -165,7 +165,7 @@ def report(tally: Tally, found: Scene, held: Verification, name: str) -> None:
     tally.met("restarts", len(held.restarts))
     different = [str(r) for r in held.restarts if not r.same]
     unbalanced = [str(b) for b in held.balances if not b.holds]
-    if not name and held.degeneracies:
+    if not name and held.degeneracies and held.explained:
         name = held.degeneracies[0].rpartition(": ")[2]
     if name and (different or unbalanced):
         tally.set_aside(f"excused: {name}", "; ".join([*different, *unbalanced]))

@@ -49,7 +49,8 @@ of six holds turn: some are said to end there, and one half of another is counte
 **What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
 failures: all cases with S = S0, or with Omega = 1/n and no damping; two events of one solution that are
 nearer than their accuracies; and smooth events at which a second condition fails
-(`contfric/atlas/degenerate.py`). Cases that take longer than a limit are cut (in runs that name no commit
+(`contfric/atlas/degenerate.py`). Events excuse what differs at them, or is joined to the start by them
+alone. Cases that take longer than a limit are cut (in runs that name no commit
 those with too many branches, too). The tables show how many there are.
 
 **To repeat.** `make stress` repeats everything. One run, and the page:

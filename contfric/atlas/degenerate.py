@@ -1,13 +1,14 @@
 """Events of a diagram that are degenerate as far as rounding can tell: there a diagram has no one answer.
 
 Each test uses the located events alone. A study with such an event may give another diagram from another
-start; differences are reported together with the event.
+start. Differences are explained by the event if they are at it, or joined to the start by it alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -30,8 +31,24 @@ _SECOND = 1e-6
 _SMOOTH = frozenset({Kind.SN, Kind.BP, Kind.PD})
 
 
-def degenerate_events(diagram: Diagram) -> Iterator[str]:
-    """Yield what is degenerate, in words: two events in one location, alike or at both ends of a branch.
+@dataclass(frozen=True)
+class Degenerate:
+    """A degenerate event in words, and the values of the parameter between which it is."""
+
+    text: str
+    low: float
+    high: float
+
+    def holds(self, value: float) -> bool:
+        """Tell whether an event at a value may be this one."""
+        return self.low <= value <= self.high
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def degenerate_events(diagram: Diagram) -> Iterator[Degenerate]:
+    """Yield what is degenerate: two events in one location, alike or at both ends of a branch.
 
     And two conditions at once.
     """
@@ -39,17 +56,52 @@ def degenerate_events(diagram: Diagram) -> Iterator[str]:
     values = sorted(
         (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
     )
+
+    def located(text: str, *events: Bifurcation) -> Degenerate:
+        there = [b.params[parameter] for b in events]
+        known = sum(b.accuracy for b in events) * width
+        return Degenerate(text, min(there) - known, max(there) + known)
+
     for a, b in pairwise(values):
         gap = b.params[parameter] - a.params[parameter]
         if gap <= (a.accuracy + b.accuracy) * width and _alike(a, b):
-            yield f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
+            text = f"{a.label} and {b.label} at {a.params[parameter]:.10g}: not to be told apart"
+            yield located(text, a, b)
     for branch in diagram.branches:
         if not branch.mirrored and unresolved(branch, width):
             location = f"{branch.name} at {branch.values[0]:.10g}"
-            yield f"{location}: {parameter} changes by less along it than its ends are known to"
+            text = f"{location}: {parameter} changes by less along it than its ends are known to"
+            yield located(text, *(e.bifurcation for e in branch.ends if e.bifurcation is not None))
     for b in values:
         if b.kind in _SMOOTH and float(np.min(b.orbit.margins, initial=np.inf)) < _SECOND:
-            yield f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too"
+            yield located(
+                f"{b.label} at {b.params[parameter]:.10g}: a margin vanishes there, too", b
+            )
+
+
+def joined_surely(
+    diagram: Diagram, first: int, degenerate: Iterable[Degenerate]
+) -> tuple[tuple[Bifurcation, ...], tuple[Branch, ...]]:
+    """Return the events and branches that are joined to a branch by events of which none is degenerate.
+
+    Every exploration from that branch has them, up to symmetry.
+    """
+    # the image of a branch is listed after it
+    own = [i - int(branch.mirrored) for i, branch in enumerate(diagram.branches)]
+    known = tuple(degenerate)
+    nodes = [
+        (node, {own[i] for i in node.branches})
+        for node in diagram.nodes
+        if not any(d.holds(node.bifurcation.params[diagram.parameter]) for d in known)
+    ]
+    reached, before = {own[first]}, 0
+    while len(reached) > before:
+        before = len(reached)
+        for _, branches in nodes:
+            if branches & reached:
+                reached |= branches
+    events = tuple(node.bifurcation for node, branches in nodes if branches & reached)
+    return events, tuple(diagram.branches[i] for i in sorted(reached))
 
 
 def _alike(a: Bifurcation, b: Bifurcation) -> bool:

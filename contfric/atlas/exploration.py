@@ -21,6 +21,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Settings
 from contfric.events.bifurcation import (
+    ACCURACY,
     TERMINAL,
     Bifurcation,
     Decision,
@@ -35,6 +36,8 @@ Progress = Callable[[str], None]
 
 #: Kinds that leave nothing to follow: the branch itself goes on.
 _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
+#: Kinds that a branch meets once each time that it passes them: a curve may come back to a branch point.
+_ONE_AFTER_ANOTHER = frozenset({Kind.SN, Kind.PD, Kind.NS})
 #: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
 #: at the event; one that is located agrees to the last, or to what it is known to: two sides of a symmetric
 #: orbit may meet their events one after the other within the first.
@@ -140,6 +143,8 @@ class Exploration:
     def _meet(self, bifurcation: Bifurcation, index: int) -> None:
         settings = self.settings
         for event in self.events:
+            if self._is_next_on_branch(event, bifurcation, index):
+                continue
             if same_event(event.bifurcation, bifurcation, settings.parameter, settings.width):
                 event.members.append(bifurcation)
                 if index not in event.branches:
@@ -154,6 +159,20 @@ class Exploration:
             self.judge(event, "go on after the event", Decision.REFUSED, why=why)
         elif bifurcation.kind not in _PASSED or _combines(bifurcation):
             self.waiting.append(event)
+
+    def _is_next_on_branch(self, event: Event, bifurcation: Bifurcation, index: int) -> bool:
+        """Tell whether a smooth event is another one of a branch that has met an event before.
+
+        Both lie on one curve, one after the other: there they are told apart better than by what each is
+        known to, which may be roughly. Next to a saddle folds and doublings follow each other that close.
+        """
+        if index not in event.branches or bifurcation.kind not in _ONE_AFTER_ANOTHER:
+            return False
+        if bifurcation.orbit.system.holds:  # there these kinds are names of one event
+            return False
+        parameter = self.settings.parameter
+        gap = abs(event.bifurcation.params[parameter] - bifurcation.params[parameter])
+        return gap > ACCURACY * self.settings.width
 
     def end_at(self, index: int, k: int, event: Event) -> None:
         """Let a branch end (its end k) at an event next to the one at which it was taken to end."""

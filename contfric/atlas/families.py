@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -123,3 +124,24 @@ def meets(end: End, event: Event, settings: Settings, kinds: frozenset[Kind] = T
         return False
     apart = stops_apart(a.orbit, b.orbit) < SAME_SOLUTION
     return apart or a.outline.apart(b.outline) < SAME_SOLUTION  # or its mirror image
+
+
+def solved_next_to(orbit: Orbit, settings: Settings, guessed: bool = False) -> Iterator[Orbit]:
+    """Yield orbits that are solved next to one at which its branch may be singular, nearer and nearer.
+
+    Joints move by the root of what the parameter changes by, at most. What Newton's method finds farther away
+    is another orbit of the itinerary, which no event need join to this one.
+
+    Parameters
+    ----------
+    guessed : the orbit is a solution nearby, which may be anywhere
+    """
+    size = 1.0 + float(np.abs(orbit.joints).max())
+    for share in SHARES:
+        guess = next_to(orbit, settings, share)
+        solved = None if guess is None else refine(guess)
+        if solved is None or not (solved.converged and solved.admissible):
+            continue
+        moved = float(np.abs(solved.joints - orbit.joints).max())
+        if guessed or moved <= max(SAME_SOLUTION, abs(share)) ** 0.5 * size:
+            yield shortest(solved)

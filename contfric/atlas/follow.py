@@ -17,7 +17,13 @@ from contfric.atlas.collect import Event
 from contfric.atlas.crossings import follow_crossing, whole_branch
 from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.families import SHARES, follow_beside_family, follow_family_at, meets
+from contfric.atlas.families import (
+    SHARES,
+    follow_beside_family,
+    follow_family_at,
+    meets,
+    solved_next_to,
+)
 from contfric.atlas.faults import fault_of, fault_of_itinerary
 from contfric.atlas.folds import follow_arms
 from contfric.atlas.leaving_event import (
@@ -36,7 +42,7 @@ from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
 from contfric.continuation.continuum import in_continuum
 from contfric.continuation.crossing import LOCATED, crossing_near
-from contfric.continuation.points import Settings, next_to
+from contfric.continuation.points import Settings
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.events.candidates import Candidate, sequences_of
 from contfric.events.from_simulation import solutions_near
@@ -45,7 +51,6 @@ from contfric.events.partial_touches import partial_touches
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.repetition import shortest
-from contfric.orbit.solve import refine
 from contfric.signature import canonical_itinerary
 from contfric.signature.edits import show
 
@@ -200,7 +205,7 @@ def _meeting(
     is found; so smaller distances are tried. Solutions near several events may follow the same itinerary,
     which ends at one of them: what was traced is not traced again.
     """
-    for near in _next_to(state, orbit):
+    for near in solved_next_to(orbit, state.settings, guessed=True):
         if any(_passes(branch, near) for branch in asked):
             continue
         traced = (*state.branches, *state.elsewhere)
@@ -360,17 +365,8 @@ def _follow_both_ways(state: Exploration, orbit: Orbit, event: Event) -> None:
 
 def _through(state: Exploration, orbit: Orbit) -> Branch | None:
     """Return the branch through an orbit at which it may be singular, from just next to it."""
-    found = (whole_branch(near, state.settings) for near in _next_to(state, orbit))
+    found = (whole_branch(near, state.settings) for near in solved_next_to(orbit, state.settings))
     return next((branch for branch in found if branch is not None), None)
-
-
-def _next_to(state: Exploration, orbit: Orbit) -> Iterator[Orbit]:
-    """Yield orbits that are solved next to one at which its branch may be singular, nearer and nearer."""
-    for share in SHARES:
-        guess = next_to(orbit, state.settings, share)
-        solved = None if guess is None else refine(guess)
-        if solved is not None and solved.converged and solved.admissible:
-            yield shortest(solved)
 
 
 # ------------------------------------------------------------------------- period doubling

@@ -21,11 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
-from contfric.atlas.degenerate import degenerate_events, unresolved
+from contfric.atlas.degenerate import Degenerate, degenerate_events, joined_surely, unresolved
 from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_location
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
+from contfric.continuation.ending import lost_in_end
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, EndReason
@@ -51,6 +52,7 @@ class Restart:
     extra : what the restart has and the diagram has not
     complete : whether the restart was run to its end
     degenerate : events of the restart that rounding may make others of, in words
+    explained : whether all that differs is at degenerate events, or joined to the branch by them alone
     """
 
     branch: int
@@ -59,6 +61,7 @@ class Restart:
     extra: tuple[str, ...]
     complete: bool = True
     degenerate: tuple[str, ...] = ()
+    explained: bool = False
 
     @property
     def same(self) -> bool:
@@ -82,7 +85,7 @@ class Verification:
     restarts: tuple[Restart, ...]
     balances: tuple[Balance, ...]
     sums: tuple[IndexSum, ...]
-    degenerate: tuple[str, ...] = ()
+    degenerate: tuple[Degenerate, ...] = ()
 
     @property
     def same(self) -> bool:
@@ -104,7 +107,14 @@ class Verification:
     def degeneracies(self) -> tuple[str, ...]:
         """Events of the diagram, and of restarts that differ, that rounding may make others of."""
         others = (text for r in self.restarts if not r.same for text in r.degenerate)
-        return tuple(dict.fromkeys((*self.degenerate, *others)))
+        return tuple(dict.fromkeys((*map(str, self.degenerate), *others)))
+
+    @property
+    def explained(self) -> bool:
+        """Whether degenerate events explain all faults: what differs is at them, or joined by them alone."""
+        return all(r.same or r.explained for r in self.restarts) and all(
+            b.holds or any(d.holds(b.value) for d in self.degenerate) for b in self.balances
+        )
 
     @property
     def missing(self) -> tuple[IndexSum, ...]:
@@ -182,9 +192,28 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
             refused = refused or f"any continuation: {error}"
             continue
         more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
-        degenerate = tuple(degenerate_events(again)) if less or more else ()
-        return Restart(i, value, less, more, again.complete, degenerate)
+        own = tuple(degenerate_events(again)) if less or more else ()
+        texts = tuple(map(str, own))
+        explained = bool(less or more) and not _told_apart(diagram, i, again, own)
+        return Restart(i, value, less, more, again.complete, texts, explained)
     return Restart(i, value, (refused,), (), True)
+
+
+def _told_apart(
+    diagram: Diagram, i: int, again: Diagram, degenerate: tuple[Degenerate, ...]
+) -> bool:
+    """Tell whether a diagram and its restart from a branch differ in what no degenerate event explains.
+
+    A pair that is not to be told apart in one of them may be one event, or none, in the other one.
+    """
+    known = (*degenerate, *degenerate_events(diagram))
+    for one, first, other in ((diagram, i, again), (again, 0, diagram)):
+        events, branches = joined_surely(one, first, known)
+        if any(_lacks_event(other, b, one) for b in events):
+            return True
+        if any(_lacks_branch(other, branch, one) for branch in branches):
+            return True
+    return False
 
 
 def _starts(branch: Branch) -> Iterator[Orbit]:
@@ -235,17 +264,31 @@ def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
 def differences(one: Diagram, other: Diagram) -> Iterator[str]:
     """Yield what a diagram has and another one has not, in words: events, then branches up to symmetry."""
     for event in one.bifurcations:
-        if not any(
-            _same_bifurcation(event, b, one.parameter, one.width) for b in other.bifurcations
-        ) and not any(_is_at(event, node, other) for node in other.events):
+        if _lacks_event(other, event, one):
             yield f"{event.label} at {one.parameter} = {event.params[one.parameter]:.12g}"
     for branch in one.branches:
-        if not branch.mirrored and not any(
-            _covers(other_branch, branch) or _as_narrow(other_branch, branch, one)
-            for other_branch in other.branches
-        ):
+        if not branch.mirrored and _lacks_branch(other, branch, one):
             low, high = branch.values.min(), branch.values.max()
             yield f"branch {branch.name} from {low:.10g} to {high:.10g}"
+
+
+def _lacks_event(diagram: Diagram, event: Bifurcation, one: Diagram) -> bool:
+    """Tell whether a diagram has not an event of another one, nor an endless period that it is lost in."""
+    if any(_same_bifurcation(event, b, one.parameter, one.width) for b in diagram.bifurcations):
+        return False
+    return not any(_is_at(event, node, diagram) for node in diagram.events) and not any(
+        lost_in_end(event, branch[-side], one.parameter, one.width)
+        for branch in diagram.branches
+        for side, end in enumerate(branch.ends)
+        if end.reason is EndReason.PERIOD
+    )
+
+
+def _lacks_branch(diagram: Diagram, branch: Branch, one: Diagram) -> bool:
+    """Tell whether a diagram has not a branch of another one."""
+    return not any(
+        _covers(known, branch) or _as_narrow(known, branch, one) for known in diagram.branches
+    )
 
 
 def _same_bifurcation(a: Bifurcation, b: Bifurcation, parameter: str, width: float) -> bool:

@@ -47,6 +47,8 @@ _LATELY = 0.25
 #: The same where a branch has ended: a saddle that repels its cycle multiplies rounding to the size of the
 #: orbit before the parameter has been still for longer.
 AT_END = 0.1
+#: Joints of events that cannot be told from such an end differ by this at most.
+_SAME = 1e-4
 
 #: A parameter that changes by less than this share of the range over hundreds of points, while states are
 #: this large and grow by this factor, comes to a resonance.
@@ -301,3 +303,14 @@ def grows(side: Side, settings: Settings) -> bool:
         return False
     before, now = (float(np.abs(side.rows.joints[k, :, 1:]).max()) for k in (0, last))
     return now > _LARGE and now > _GROWS * before
+
+
+def lost_in_end(event: Bifurcation, end: Orbit, parameter: str, width: float) -> bool:
+    """Tell whether an event differs from an end of endless period by less than events are known to.
+
+    Points there differ by rounding alone, and so do their multipliers: they change sign for no reason. Next
+    to a saddle with complex eigenvalues events never cease; which of them is the last would be a matter of
+    the step.
+    """
+    gap = abs(event.params[parameter] - end.params[parameter])
+    return gap < ACCURACY * width and event.outline.apart(end.outline) < _SAME

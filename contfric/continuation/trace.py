@@ -22,6 +22,7 @@ from contfric.continuation.ending import (
     AT_END,
     endless,
     grows,
+    lost_in_end,
     never_leaves,
     only_lengthens,
     slows_down,
@@ -38,7 +39,7 @@ from contfric.continuation.stopping import stop_among
 from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
 from contfric.continuation.vertical import VerticalFamily, family_near
 from contfric.errors import ConvergenceError, function_of
-from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
+from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason
 from contfric.orbit.orbit import Orbit
 from contfric.remember.advance import foresee, foreseeable
 from contfric.remember.journal import remembered
@@ -211,7 +212,9 @@ def trace_side(
             if side.end.reason is EndReason.SINGULAR and only_lengthens(side, settings, AT_END):
                 side.end = End(EndReason.PERIOD)
             if side.end.reason is EndReason.PERIOD:
-                _forget_unresolved(side, settings)
+                last, events = _tip(orbit, side, settings), side.bifurcations
+                while events and lost_in_end(events[-1], last, settings.parameter, settings.width):
+                    events.pop()
             side.rows = side.rows.first(side.last + 1)
             return side
 
@@ -223,19 +226,6 @@ _MAY_BE_ENDLESS = frozenset(
 )
 #: Why an orbit with chatter is not finite beyond a point.
 _NO_REST = "incomplete chatter: beyond this point the impacts do not come to rest"
-
-
-def _forget_unresolved(side: Side, settings: Settings) -> None:
-    """Leave out the last events before an end of endless period, which differ from it by less than is known.
-
-    Points there differ by rounding alone, and so do their multipliers: they change sign for no reason. Next
-    to a saddle with complex eigenvalues events never cease; which of them is the last would be a matter of
-    the step.
-    """
-    end, known = side.tip.value, ACCURACY * settings.width
-    events = side.bifurcations
-    while events and abs(events[-1].params[settings.parameter] - end) < known:
-        events.pop()
 
 
 def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple[bool, float]:
