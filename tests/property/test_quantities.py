@@ -73,6 +73,27 @@ def test_harmonics_sum_to_the_mean_square(params: dict[str, float]) -> None:
     assert total == pytest.approx(orbit.quantity("mean(x**2)"), abs=1e-7)
 
 
+@given(PARAMS, st.sampled_from((2, 4, 6)), st.sampled_from(("x", "v", "x**3", "u + 0.1*v")))
+@settings(max_examples=15)
+def test_a_harmonic_that_vanishes_has_no_phase(
+    params: dict[str, float], harmonic: int, odd: str
+) -> None:
+    """Half a period later a symmetric orbit is its own image: what is odd has odd harmonics only."""
+    orbit = found(params)
+    if orbit is None or not orbit.symmetric:
+        return
+    even = f"({odd})**2"
+    for g, k in ((odd, harmonic), (even, harmonic - 1)):
+        phase = f"phase({g}, {k})"
+        assert np.isnan(orbit.quantity(phase))
+        gradient = orbit.gradient(phase)
+        assert "vanishes" in gradient.notes[0] and np.all(np.isnan(list(gradient.values())))
+        assert orbit.quantity(f"amplitude({g}, {k})") < 1e-12 * orbit.quantity(f"rms({g})")
+    for g, k in ((odd, 1), (even, harmonic)):
+        gradient = orbit.gradient(f"phase({g}, {k})")
+        assert not gradient.notes and np.all(np.isfinite([gradient.value, *gradient.values()]))
+
+
 QUANTITIES = (
     "x_max",
     "energy",
