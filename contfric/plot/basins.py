@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contfric.plot.cells import draw_cells
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import GREY, NEXT_TO, SMALL, branch_colours, lighter, sized
 
@@ -70,7 +71,7 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     if found.missing:
         handles.append(Line2D([], [], ls="", label=f"{found.missing} starts not computed"))
     ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
-    name_axes(ax, f"${first}$", f"${second}$")
+    name_axes(ax, parameter_label(first), parameter_label(second))
     return ax
 
 
@@ -109,5 +110,5 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
             ax.plot(*part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}")
     ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
     if not ax.get_xlabel():
-        name_axes(ax, f"${first}$", f"${second}$")
+        name_axes(ax, parameter_label(first), parameter_label(second))
     return ax

@@ -237,7 +237,9 @@ def test_interrupted_and_gone_on(found: cf.Ensemble, tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     part = compute(folder=tmp_path, progress=stop)
-    assert not part.complete and 4 <= part.counts()["missing"] <= 8  # the second of three tiles was begun
+    assert (
+        not part.complete and 4 <= part.counts()["missing"] <= 8
+    )  # the second of three tiles was begun
     said: list[str] = []
     whole = compute(folder=tmp_path, progress=said.append)
     assert said[0].startswith("1 of 3 tiles are in") and "about" in said[1]

@@ -273,11 +273,13 @@ def test_jumps_and_poles_of_a_quantity_are_no_values_of_it(seed: int) -> None:
     plain = cf.continue_orbit(orbit, "Omega", (0.48, 0.53))
     low, high = float(plain.x_max.min()), float(plain.x_max.max())
     at, value = low + rng.uniform(0.2, 0.5) * (high - low), rng.uniform(0.5, 3.0)
+    undefined = f"0*sqrt((x_max - {at!r})**2 - {(1e-4 * (high - low)) ** 2!r})"
     far = 5.0 * value / (high - low)  # taken beyond the pole, some steps away from it
     for text, wanted, taken in [
         (f"1/(x_max - {at!r})", 0.01 * value, False),
         (f"where(x_max > {at!r}, 2, 1)", 1.5, False),
         (f"sign(x_max - {at!r})", 0.3, False),
+        (f"sign(x_max - {at!r}) + {undefined}", 0.3, False),
         (f"1/(x_max - {at!r})", far, True),
         (f"log(x_max - {at!r})", float(np.log(0.3 * (high - at))), True),
         (f"sqrt({low - 1.0!r} - x_max)", 1.0, False),
