@@ -270,8 +270,8 @@ def draw_row(
     across = parameter_label(branches[0].parameter) if branches else None
     name_axes(ax, across, label.name(displacement))
     if branches and not np.all(np.isfinite(ax.dataLim.intervaly)):
-        middle = {"transform": ax.transAxes, "ha": "center", "va": "center"}
-        ax.text(0.5, 0.5, "no finite value", fontsize=sized(TEXT), **middle)
+        middle = ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, va="center")
+        middle.set(ha="center", fontsize=sized(TEXT))
     if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
         ax.locator_params(axis="x", nbins=_TICKS)
 

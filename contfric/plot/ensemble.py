@@ -99,5 +99,5 @@ def _draw_events(ax: Axes, found: Ensemble) -> None:
         kind, names = event.label.split(" ", 1)
         text = f" {event_label(kind)} {names}, {event.share:.0%} "
         ahead = low + high < sum(found.range)  # the text has more space there
-        side = {"ha": "left" if ahead else "right", "va": "center", "fontsize": sized(0.8 * SMALL)}
-        ax.text(high if ahead else low, k * _LINE, text, transform=where, **side)
+        side = ax.text(high if ahead else low, k * _LINE, text, transform=where, va="center")
+        side.set(ha="left" if ahead else "right", fontsize=sized(0.8 * SMALL))

@@ -180,9 +180,8 @@ class Measuring:
         size = math.hypot(a, b)
         if asked.kind == "phase":
             if size <= self._silent(asked):
-                self.kinks.append(
-                    f"phase({asked.text}, {asked.harmonic:g}): this harmonic vanishes, and has no phase"
-                )
+                name = f"phase({asked.text}, {asked.harmonic:g})"
+                self.kinks.append(f"{name}: this harmonic vanishes, and has no phase")
                 return math.nan, np.full(self.motion.count, math.nan)
             turned = np.array((-b * scale, -a * scale, 0.0)).dot(slopes)
             return math.atan2(b, a), _over(turned, size**2)
