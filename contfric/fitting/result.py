@@ -125,7 +125,7 @@ class Fit(Tabled):
     def _limits(self) -> tuple[str, ...]:
         """Return the inequalities of the model that keep the free parameters from going on."""
         by_free = dict(zip(self.free, np.diag(self.covariance).tolist(), strict=True))
-        found = {}
+        found: dict[str, None] = {}
         for orbit, limit in product(self.orbits, self.model.constraints):
             own = {name: c for name, c in limit.coefficients.items() if name in by_free and c}
             spread = sum(c * c * by_free[name] for name, c in own.items()) ** 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,17 +55,13 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     """
     ax = axes_or_new(ax)
     first, second = found.axes
-    colours = [lighter(c, 0.35) for c in branch_colours(found.names).values()]
-    kinds = np.unique(found.motions[found.labels < 0]).tolist()
-    number = found.labels.copy()
-    for k, code in enumerate(kinds):
-        number[(found.labels < 0) & (found.motions == code)] = len(colours) + k
-        colours.append(_OTHERS[min(k, len(_OTHERS) - 1)])
+    colours = _shown(found)
     shades, most = ListedColormap(colours or [GREY]), max(1, len(colours)) - 0.5
+    number = np.ma.masked_less(found.of_share, 0)
     draw_cells(ax, found.axes, number, cmap=shades, vmin=-0.5, vmax=most)
     _draw_orbits(ax, found, first, second)
     names = [f"{_NONE.get(s.name, s.name)}: {s.share:.1%}" for s in found.shares]
-    shown = zip(_shown(found, colours), names, strict=False)
+    shown = zip(colours, names, strict=True)
     handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
     if found.orbits and not found.model.autonomous:
         handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
@@ -75,10 +72,11 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _shown(found: Basins, colours: list[str]) -> list[str]:
+def _shown(found: Basins) -> list[str]:
     """Return the colours of the shares, in their order."""
-    others = iter(colours[len(found.names) :])
-    return [colours[s.orbit] if s.orbit >= 0 else next(others, GREY) for s in found.shares]
+    orbits = [lighter(colour, 0.35) for colour in branch_colours(found.names).values()]
+    others = chain(_OTHERS, repeat(_OTHERS[-1]))
+    return [orbits[s.orbit] if s.orbit >= 0 else next(others) for s in found.shares]
 
 
 def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:

@@ -44,6 +44,7 @@ def plot_fit(found: Fit, ax: Axes | None = None) -> Axes:
         ax.plot(x, table["fitted"][own], look, ms=4.0, color=colour, linewidth=LINE_WIDTH)
     if across == "datum":
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_xlim(0.5, table["datum"].max() + 0.5)
     names = {"t": "$t$", "datum": "datum"}
     name_axes(ax, names.get(across) or parameter_label(across), "measured, and fitted (lines)")
     ax.legend(fontsize=sized(SMALL), loc="best")

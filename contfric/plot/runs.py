@@ -72,8 +72,7 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
     stability was not computed is one run with ``stable`` None; a bridge, which is nowhere stable,
     is one run too.
     """
-    vertices, functional = _vertices(branch, row), integrated(quantity_of(row, branch.model))
-    turns = functional is not None and functional.kind == "phase"
+    vertices, turns = _vertices(branch, row), _is_phase(branch, row)
     runs: list[StabilityRun] = []
     start = 0
     states = [False] * (len(vertices) - 1) if branch.bridge else list(_between(vertices))
@@ -84,6 +83,13 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
             runs.append(StabilityRun(states[start], *(_cut_at_turns(x, y) if turns else (x, y))))
             start = k
     return runs
+
+
+def _is_phase(branch: Branch, row: QuantityLike) -> bool:
+    if isinstance(row, str) and row in NAMED:
+        return False
+    functional = integrated(quantity_of(row, branch.model))
+    return functional is not None and functional.kind == "phase"
 
 
 def _cut_at_turns(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

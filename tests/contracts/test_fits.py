@@ -319,7 +319,7 @@ def test_a_fit_that_misses_its_data_says_so(
 
 
 def test_a_fit_at_a_limit_of_the_model_says_so() -> None:
-    """The friction that the data ask for is larger than the static one, S <= S0; other data are met inside."""
+    """Data that ask for more friction than the static one, S <= S0, and others that do not."""
     params = {"Omega": 0.5, "S": 0.3, "S0": 0.4}
     beyond = cf.fit("coulomb", [cf.Measured("rms(v)", 0.55, 0.01)], params, ["S"])
     assert beyond.params["S"] == pytest.approx(0.4, abs=1e-9)
