@@ -270,3 +270,13 @@ def test_a_row_without_a_finite_value_says_so() -> None:
     assert np.all(np.isnan(branch.quantity("phase(x, 2)")))
     assert "no finite value" in [text.get_text() for text in branch.plot(row="phase(x, 2)").texts]
     assert "no finite value" not in [text.get_text() for text in branch.plot(row="psi").texts]
+
+
+@pytest.mark.parametrize("model", ["belt", "coulomb", "impact"])
+def test_the_legend_of_an_orbit_hides_no_name_of_a_level(model: str) -> None:
+    ax = cf.find_orbit(model).plot()
+    ax.figure.canvas.draw()
+    legend = ax.get_legend().get_window_extent()
+    texts = [text.get_window_extent() for text in ax.texts if text.get_text()]
+    beyond = [box for box in texts if box.x0 >= ax.bbox.x1]
+    assert beyond and not any(legend.overlaps(box) for box in beyond)
