@@ -197,8 +197,9 @@ def _belongs(unknown: str, part: type[BaseModel]) -> str:
 
 def _missing_instead(unknown: str, part: type[BaseModel], data: Any, address: Address) -> str:
     """Return the key that is missing where another one is unknown, unless that looks like a third one."""
-    for step in _place(data, address[:-1]):
-        data = data[step]
+    for step in _place(data, address[:-1]):  # a key may be a number or a truth value
+        keys = {str(key): key for key in data} if isinstance(data, Mapping) else {}
+        data = data[keys.get(str(step), step)]
     fields = _fields(part)
     missing = [key for key, info in fields.items() if info.is_required() and key not in data]
     if len(missing) != 1 or did_you_mean(unknown, missing).startswith("; did"):
