@@ -138,6 +138,7 @@ bench: $(BENCH_STAMP)
 	@$(BIN)/python benchmarks/lyapunov_models.py
 	@$(BIN)/python benchmarks/integrated.py
 	@$(BIN)/python benchmarks/states.py
+	@$(BIN)/python benchmarks/everyday.py
 	@$(BIN)/python benchmarks/contacts.py
 	@$(BIN)/python benchmarks/six_segments.py
 	@$(BIN)/python benchmarks/first_orbit.py

@@ -24,6 +24,7 @@ FURTHER = (
     "[run time against error](benchmarks-error.md) (next to other packages),",
     "[AUTO-07p](benchmarks-auto.md) (a branch, paired),",
     "[number of states](benchmarks-states.md) (a chain with a contact, next to scipy and heyoka),",
+    "[sweeps and basins](benchmarks-everyday.md) (next to a loop with scipy, and to recurrences),",
     "[curves in two parameters](curves.md#cost), [Lyapunov maps](lyapunov.md#run-time-accuracy-memory),",
     "[numerical integration](benchmarks-integrated.md).",
 )

@@ -154,8 +154,8 @@ def _message(entry: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
     part, key, info = _described(schema, address)
     if entry["type"] in _UNKNOWN:
         unknown = str(address[-1])
-        hint = comma_hint(unknown, given) or _belongs(unknown, part)
-        hint = hint or did_you_mean(unknown, _fields(part))
+        hint = comma_hint(unknown, given) or _missing_instead(unknown, part, data, address)
+        hint = hint or _belongs(unknown, part) or did_you_mean(unknown, _fields(part))
         return f"unknown key '{unknown}'{hint}"
     if entry["type"] in _NO_KIND and info is not None:
         own, tag = entry["ctx"]["discriminator"], entry["ctx"].get("tag")
@@ -193,6 +193,18 @@ def _belongs(unknown: str, part: type[BaseModel]) -> str:
         if homes
         else ""
     )
+
+
+def _missing_instead(unknown: str, part: type[BaseModel], data: Any, address: Address) -> str:
+    """Return the key that is missing where another one is unknown, unless that looks like a third one."""
+    for step in _place(data, address[:-1]):  # a key may be a number or a truth value
+        keys = {str(key): key for key in data} if isinstance(data, Mapping) else {}
+        data = data[keys.get(str(step), step)]
+    fields = _fields(part)
+    missing = [key for key, info in fields.items() if info.is_required() and key not in data]
+    if len(missing) != 1 or did_you_mean(unknown, missing).startswith("; did"):
+        return ""
+    return f"; key '{missing[0]}' is missing: {fields[missing[0]].description}"
 
 
 def _given(value: object) -> str:

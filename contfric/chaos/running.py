@@ -47,6 +47,7 @@ def compute_all(
     compute: Compute,
     threads: int | None = None,
     following: Callable[[K, Any], T | None] = lambda name, rows: None,
+    here: Compute | None = None,
 ) -> Iterator[tuple[K, Any]]:
     """Yield (name, rows) of each task as it is finished.
 
@@ -58,6 +59,7 @@ def compute_all(
     compute : returns the rows of a task
     threads : most threads of this process; one where tasks are Python, which holds the lock
     following : returns the task that needs the rows of one with a name; None at the end of its chain
+    here : computes a task in this process, if that is another function
 
     A task that fails there (a killed worker, a broken pool, a lost connection) is computed in this process,
     with those that follow it; only if that fails, too, is it an error.
@@ -75,7 +77,7 @@ def compute_all(
     pool = ThreadPoolExecutor(count, thread_name_prefix="contfric-tile")
 
     def submit(task: T) -> Future[Any]:
-        return pool.submit(compute, task, stop)
+        return pool.submit(here or compute, task, stop)
 
     try:
         yield from _followed(tasks, submit, following, None, count * _AHEAD)

@@ -72,6 +72,7 @@ class Work(Generic[T, R]):
     compute : returns the rows of a task
     executor, threads : as :func:`contfric.chaos.running.compute_all` takes them
     prepare : called before any is computed
+    here : computes a task in this process, if that is another function
     """
 
     what: str
@@ -80,6 +81,7 @@ class Work(Generic[T, R]):
     progress: Progress | None
     threads: int | None = None
     prepare: Callable[[], None] = lambda: None
+    here: Compute | None = None
 
     def finish(self, tasks: Sequence[T], put: Callable[[int, R], None]) -> None:
         """Hand the rows of each task to ``put``, by its number; they are kept where a journal is.
@@ -103,7 +105,7 @@ class Work(Generic[T, R]):
             if left:
                 self.prepare()
             for number, found in compute_all(
-                left, self.executor, timer.say, self.compute, self.threads
+                left, self.executor, timer.say, self.compute, self.threads, here=self.here
             ):
                 kept.put(tasks[number], found)
                 put(number, found)

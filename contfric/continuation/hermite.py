@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -51,7 +52,8 @@ def zero_between(
 ) -> Point | None:
     """Return the point of a step at which a value of its solved points is zero; None if Newton fails.
 
-    The value has different signs at both ends; the location is found by Brent's method.
+    The value has different signs at both ends; the location is found by Brent's method. If the value is no
+    number somewhere on the way, the point where that is so is returned.
     """
     brentq = whole("scipy.optimize").brentq
 
@@ -63,11 +65,19 @@ def zero_between(
             raise ArithmeticError
         return point
 
+    undefined: list[Point] = []
+
     def value_at(share: float) -> float:
-        return value(point_at(share))
+        point = point_at(share)
+        found = value(point)
+        if math.isnan(found):
+            undefined.append(point)
+            return 0.0  # which ends the search
+        return found
 
     try:
-        return point_at(float(brentq(value_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST)))
+        found = point_at(float(brentq(value_at, 0.0, 1.0, xtol=_SHORTEST, rtol=4.0 * _SHORTEST)))
+        return undefined[0] if undefined else found
     except ArithmeticError:
         return None  # inside of the step, near an event
 

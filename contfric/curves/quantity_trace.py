@@ -193,7 +193,12 @@ def _start(
         if stopped:
             return branch[stopped[0]]
         values = branch.quantity(quantity.asked)
-        seen.append(f"from {np.min(values):.6g} to {np.max(values):.6g} along {name}")
+        values = values[np.isfinite(values)]
+        seen.append(
+            f"from {np.min(values):.6g} to {np.max(values):.6g} along {name}"
+            if len(values)
+            else f"not finite along {name}"
+        )
     raise ConvergenceError(
         f"no orbit of this signature with {quantity.name} = {value:g} was found: it is {' and '.join(seen)}",
         orbit,

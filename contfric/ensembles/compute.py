@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -74,7 +75,7 @@ def ensemble(
     Each sample is an exploration, as by :func:`contfric.explore`, from an orbit that a simulation finds at
     ``params[parameter]``, or elsewhere in the range. Sample i depends on ``seed`` and i only: the result is
     the same to the last bit for any number of workers. Ctrl-C ends the computation; the samples that are
-    finished are returned.
+    finished are returned, but not those of tiles that an executor has begun.
 
     Parameters
     ----------
@@ -208,10 +209,17 @@ def _computed(
 ) -> Rows:
     vectors = np.split(whole.vectors, range(side, len(whole.vectors), side))
     rows = [Rows.empty(len(part)) for part in vectors]
+    tiles = [replace(whole, vectors=part) for part in vectors]
+
+    def keep(tile: EnsembleTile, finished: Rows) -> None:
+        rows[tiles.index(tile)] = finished
+
     # a tile is Python, which holds the lock
     work: Work[EnsembleTile, Rows] = Work(
-        "ensemble", compute_ensemble_tile, executor, progress, threads=1
+        *("ensemble", compute_ensemble_tile, executor, progress),
+        threads=1,
+        here=partial(compute_ensemble_tile, begun=keep),
     )
     with suppress(KeyboardInterrupt):
-        work.finish([replace(whole, vectors=part) for part in vectors], rows.__setitem__)
+        work.finish(tiles, rows.__setitem__)
     return joined(rows)

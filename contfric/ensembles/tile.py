@@ -5,7 +5,7 @@ Of a diagram its events are read by name, and a quantity of every orbit at fixed
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from contfric.atlas.explore import explore
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.chaos.work import TileTask
 from contfric.continuation.branch import Branch
-from contfric.ensembles.rows import Drawn, Rows
+from contfric.ensembles.rows import Drawn, Rows, joined
 from contfric.errors import ContfricError, ConvergenceError, ParameterError
 from contfric.events.bifurcation import EndReason
 from contfric.models.definition import Model
@@ -70,8 +70,16 @@ class EnsembleTile(TileTask):
     options: dict[str, Any]
 
 
-def compute_ensemble_tile(tile: EnsembleTile, stop: IntArray | None = None) -> Rows:
+def compute_ensemble_tile(
+    tile: EnsembleTile,
+    stop: IntArray | None = None,
+    begun: Callable[[EnsembleTile, Rows], None] | None = None,
+) -> Rows:
     """Explore the samples of a tile; ``stop`` is set by Ctrl-C, and ends it between two of them.
+
+    Parameters
+    ----------
+    begun : told of the samples that were finished until then
 
     Raises
     ------
@@ -81,6 +89,8 @@ def compute_ensemble_tile(tile: EnsembleTile, stop: IntArray | None = None) -> R
     gathered = _Gathered()
     for number, vector in enumerate(tile.vectors):
         if stop is not None and stop[0]:
+            if begun is not None and number:
+                begun(tile, joined([gathered.rows(), Rows.empty(len(tile.vectors) - number)]))
             raise KeyboardInterrupt
         with cores_are_busy():
             gathered.add(tile, number, vector)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.errors import ContfricError
+from contfric.errors import ContfricError, ConvergenceError
 from contfric.fitting.data import Measured, Series
 from contfric.models.language.quantity_texts import Functional, read
 from contfric.orbit.gradient import by_parameters
@@ -38,11 +38,22 @@ def signal_of(text: str, orbit_inside: Inside) -> Functional:
 
 
 def predicted(data: Measured | Series, orbit: Orbit) -> tuple[FloatArray, FloatArray]:
-    """Return values, shape (k,), and derivatives by every parameter, shape (k, parameters)."""
+    """Return values, shape (k,), and derivatives by every parameter, shape (k, parameters).
+
+    Raises
+    ------
+    ConvergenceError
+        If one is not finite.
+    """
     if isinstance(data, Series):
         return _series(data, orbit)
     quantity = number_quantity(data.quantity, orbit.model, "a measurement")
     found = differentiated(quantity, orbit, by_parameters(orbit))
+    if not (np.isfinite(found.value) and np.all(np.isfinite(found.ahead))):
+        why = "; ".join(found.kinks) or "it cannot be fitted there"
+        raise ConvergenceError(
+            f"{quantity.name} or one of its derivatives is not finite: {why}", orbit
+        )
     return np.array([found.value]), found.ahead[None, :]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,8 @@ INTERRUPTED = "interrupted"
 #: A sum of squares that errors of the given sizes exceed less often than this is called too large: one right
 #: fit in ten thousand is.
 _UNLIKELY = 1e-4
+#: A fit that is nearer to a limit of the model than this share of a standard deviation is at it.
+_AT_LIMIT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +104,13 @@ class Fit(Tabled):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What makes the fit doubtful, one line each: it is not converged, or misses its data."""
+        """What makes the fit doubtful, one line each: not converged, at a limit, or it misses its data."""
         found = [] if self.converged else [f"not converged: {self.message}"]
+        found += [
+            f"at a limit: the model needs {text}, and the fit ends there; standard deviations hold for "
+            "parameters inside of their limits"
+            for text in self._limits()
+        ]
         spare = max(1, len(self.residuals) - len(self.free))
         from scipy.special import chdtrc
 
@@ -112,6 +120,17 @@ class Fit(Tabled):
                 "the standard deviations of the parameters do not hold (a wrong model, data of another "
                 "branch, another minimum, or a sigma that is too small)"
             )
+        return tuple(found)
+
+    def _limits(self) -> tuple[str, ...]:
+        """Return the inequalities of the model that keep the free parameters from going on."""
+        by_free = dict(zip(self.free, np.diag(self.covariance).tolist(), strict=True))
+        found: dict[str, None] = {}
+        for orbit, limit in product(self.orbits, self.model.constraints):
+            own = {name: c for name, c in limit.coefficients.items() if name in by_free and c}
+            spread = sum(c * c * by_free[name] for name, c in own.items()) ** 0.5
+            if own and limit.value(orbit.params) <= _AT_LIMIT * spread:
+                found[limit.text] = None
         return tuple(found)
 
     def columns(self) -> Columns:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from contfric.plot.cells import draw_cells
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import GREY, NEXT_TO, SMALL, branch_colours, lighter, sized
 
@@ -53,31 +55,28 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     """
     ax = axes_or_new(ax)
     first, second = found.axes
-    colours = [lighter(c, 0.35) for c in branch_colours(found.names).values()]
-    kinds = np.unique(found.motions[found.labels < 0]).tolist()
-    number = found.labels.copy()
-    for k, code in enumerate(kinds):
-        number[(found.labels < 0) & (found.motions == code)] = len(colours) + k
-        colours.append(_OTHERS[min(k, len(_OTHERS) - 1)])
+    colours = _shown(found)
     shades, most = ListedColormap(colours or [GREY]), max(1, len(colours)) - 0.5
+    number = np.ma.masked_less(found.of_share, 0)
     draw_cells(ax, found.axes, number, cmap=shades, vmin=-0.5, vmax=most)
     _draw_orbits(ax, found, first, second)
     names = [f"{_NONE.get(s.name, s.name)}: {s.share:.1%}" for s in found.shares]
-    shown = zip(_shown(found, colours), names, strict=False)
+    shown = zip(colours, names, strict=True)
     handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
     if found.orbits and not found.model.autonomous:
         handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
     if found.missing:
         handles.append(Line2D([], [], ls="", label=f"{found.missing} starts not computed"))
     ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
-    name_axes(ax, f"${first}$", f"${second}$")
+    name_axes(ax, parameter_label(first), parameter_label(second))
     return ax
 
 
-def _shown(found: Basins, colours: list[str]) -> list[str]:
+def _shown(found: Basins) -> list[str]:
     """Return the colours of the shares, in their order."""
-    others = iter(colours[len(found.names) :])
-    return [colours[s.orbit] if s.orbit >= 0 else next(others, GREY) for s in found.shares]
+    orbits = [lighter(colour, 0.35) for colour in branch_colours(found.names).values()]
+    others = chain(_OTHERS, repeat(_OTHERS[-1]))
+    return [orbits[s.orbit] if s.orbit >= 0 else next(others) for s in found.shares]
 
 
 def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:
@@ -109,5 +108,5 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
             ax.plot(*part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}")
     ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
     if not ax.get_xlabel():
-        name_axes(ax, f"${first}$", f"${second}$")
+        name_axes(ax, parameter_label(first), parameter_label(second))
     return ax

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -268,6 +269,9 @@ def draw_row(
     displacement = branches[0].model.states[0] if branches else "x"
     across = parameter_label(branches[0].parameter) if branches else None
     name_axes(ax, across, label.name(displacement))
+    if branches and not np.all(np.isfinite(ax.dataLim.intervaly)):
+        middle = ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, va="center")
+        middle.set(ha="center", fontsize=sized(TEXT))
     if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
         ax.locator_params(axis="x", nbins=_TICKS)
 

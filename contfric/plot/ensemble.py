@@ -97,5 +97,7 @@ def _draw_events(ax: Axes, found: Ensemble) -> None:
         ax.plot([low, high], [k * _LINE] * 2, color="black", lw=1.0, transform=where)
         ax.plot([middle], [k * _LINE], "|", color="black", ms=sized(6.0), transform=where)
         kind, names = event.label.split(" ", 1)
-        text = f" {event_label(kind)} {names}, {event.share:.0%}"
-        ax.text(high, k * _LINE, text, fontsize=sized(0.8 * SMALL), va="center", transform=where)
+        text = f" {event_label(kind)} {names}, {event.share:.0%} "
+        ahead = low + high < sum(found.range)  # the text has more space there
+        side = ax.text(high if ahead else low, k * _LINE, text, transform=where, va="center")
+        side.set(ha="left" if ahead else "right", fontsize=sized(0.8 * SMALL))

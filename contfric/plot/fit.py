@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
@@ -41,6 +42,9 @@ def plot_fit(found: Fit, ax: Axes | None = None) -> Axes:
         colour = points.lines[0].get_color()
         look = "-" if across == "t" else "-x"
         ax.plot(x, table["fitted"][own], look, ms=4.0, color=colour, linewidth=LINE_WIDTH)
+    if across == "datum":
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_xlim(0.5, table["datum"].max() + 0.5)
     names = {"t": "$t$", "datum": "datum"}
     name_axes(ax, names.get(across) or parameter_label(across), "measured, and fitted (lines)")
     ax.legend(fontsize=sized(SMALL), loc="best")

@@ -7,8 +7,10 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import ScaledTranslation
 
 from contfric.errors import ParameterError
 from contfric.plot.labels import Anchor, lay_out, place_labels
@@ -72,12 +74,21 @@ def plot_orbit(
     if legend:
         handles = legend_handles(orbit, pieces_of(orbit))
         if ax is None:
-            new.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
+            look = {**NEXT_TO, "bbox_transform": new.transAxes + _beyond_labels(new)}
+            new.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **look)
         else:
             new.legend(handles=handles, fontsize=sized(SMALL - 1.0), loc="best")
     lay_out(new)
     place_labels(new, named)
     return new
+
+
+def _beyond_labels(ax: Axes) -> ScaledTranslation:
+    """Return the way to the right that a legend next to the axes goes, beyond the names of levels there."""
+    figure = ax.figure
+    right = max((text.get_window_extent().x1 for text in ax.texts), default=-np.inf)
+    inches = max(0.0, right - ax.bbox.x1) / figure.dpi
+    return ScaledTranslation(inches, 0.0, figure.dpi_scale_trans)
 
 
 def _draw_plane(new: Axes, orbit: Orbit, plane: tuple[str, str] | None) -> list[Anchor]:

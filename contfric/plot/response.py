@@ -45,7 +45,11 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
     for direction in sweep.runs:
         x, y = sweep.points(direction, state)
         _draw(ax, x, y, _COLOURS[direction], 2.0, direction)
-    name_axes(ax, parameter_label(sweep.parameter), f"${name}$ at {_section(sweep.section)}")
+    name_axes(
+        ax,
+        parameter_label(sweep.parameter),
+        f"{parameter_label(name)} at {_section(sweep.section)}",
+    )
     ax.set_title(fixed_text(sweep.params), fontsize=sized(TEXT))
     if len(sweep.runs) > 1:
         ax.legend(fontsize=sized(SMALL), markerscale=4.0, loc="best")

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.base.arrays import FloatArray
+from contfric.plot.names import parameter_label
 from contfric.plot.save import axes_or_new, name_axes
 from contfric.plot.style import GREY, LINE_WIDTH, branch_colours, lighter
 
@@ -51,7 +52,9 @@ def plot_returns(
     size = _FEW_POINT if few else _POINT
     ax.plot(x, y, linestyle="none", marker=".", markersize=size, color="#1F4E79")
     _draw_diagonal(ax, np.concatenate([x, y]))
-    name_axes(ax, f"${name}_{{k}}$", f"${name}_{{k+{step}}}$")
+    body = parameter_label(name).strip("$")
+    body = f"{{{body}}}" if "_" in body else body
+    name_axes(ax, f"${body}_{{k}}$", f"${body}_{{k+{step}}}$")
     return ax
 
 

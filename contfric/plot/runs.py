@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.quantities.registry import NAMED
+from contfric.quantities.extreme import integrated
+from contfric.quantities.registry import NAMED, quantity_of
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
@@ -71,7 +72,7 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
     stability was not computed is one run with ``stable`` None; a bridge, which is nowhere stable,
     is one run too.
     """
-    vertices = _vertices(branch, row)
+    vertices, turns = _vertices(branch, row), _is_phase(branch, row)
     runs: list[StabilityRun] = []
     start = 0
     states = [False] * (len(vertices) - 1) if branch.bridge else list(_between(vertices))
@@ -79,9 +80,22 @@ def stability_runs(branch: Branch, row: QuantityLike) -> list[StabilityRun]:
         if k == len(states) or states[k] is not states[start]:
             part = vertices[start : k + 1]
             x, y = np.array([v.x for v in part]), np.array([v.y for v in part])
-            runs.append(StabilityRun(states[start], x, y))
+            runs.append(StabilityRun(states[start], *(_cut_at_turns(x, y) if turns else (x, y))))
             start = k
     return runs
+
+
+def _is_phase(branch: Branch, row: QuantityLike) -> bool:
+    if isinstance(row, str) and row in NAMED:
+        return False
+    functional = integrated(quantity_of(row, branch.model))
+    return functional is not None and functional.kind == "phase"
+
+
+def _cut_at_turns(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a line of angles with gaps where they pass from one end of the turn to the other."""
+    gaps = np.flatnonzero(np.abs(np.diff(y[:, 0])) > np.pi) + 1
+    return np.insert(x, gaps, np.nan), np.insert(y, gaps, np.nan, axis=0)
 
 
 def _vertices(branch: Branch, row: QuantityLike) -> list[_Vertex]:

@@ -45,6 +45,10 @@ _COLUMN = 1.7
 #: Lengths in a legend of columns, in units of its text: a column of a journal is as wide as two of them.
 _TIGHT = {"columnspacing": 1.0, "handlelength": 1.6, "handletextpad": 0.6}
 
+#: Numbers that differ by less, relative to their size, are one: events are located to 1e-12. It is drawn on
+#: axes that reach so far around it, as a share of its size: their ticks have four digits.
+_ROUNDING, _AROUND = 1e-11, 1e-3
+
 _width: ContextVar[float | None] = ContextVar("width", default=None)
 
 
@@ -218,3 +222,14 @@ def name_axes(ax: Axes, across: str | None, up: str) -> None:
         ax.set_xlabel(across, fontsize=sized(TEXT + 1))
     ax.set_ylabel(up, fontsize=sized(TEXT + 1))
     ax.tick_params(direction="in", top=True, right=True, labelsize=sized(SMALL + 1))
+    _spread_rounding(ax)
+
+
+def _spread_rounding(ax: Axes) -> None:
+    """Let axes of numbers that differ by rounding alone show their value; it is drawn as a level line."""
+    corners = ax.dataLim.get_points()
+    size, width = np.abs(corners).max(axis=0), np.ptp(corners, axis=0)
+    constant = np.isfinite(size) & (width < _ROUNDING * size)
+    if np.any(constant):
+        by = np.where(constant, _AROUND * size, 0.0)
+        ax.update_datalim([corners[0] - by, corners[1] + by])

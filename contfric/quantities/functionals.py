@@ -37,6 +37,9 @@ _EQUAL = 1e-10
 #: Derivatives of equal extrema that differ by more than this, relative to 1 + their size, differ; or by so
 #: many units of the flow's rounding, which fast motion amplifies.
 _APART, _UNITS = 1e-7, 1e8
+#: A harmonic this small next to the root mean square is rounding: orbits are solved to 1e-13, and less than
+#: two digits of its phase would be left; or so many units of the flow's rounding.
+_SILENT, _SILENT_UNITS = 1e-12, 100.0
 #: Newton steps to a stationary point from its place in the Legendre series, which is good to 1e-9.
 _STEPS = 2
 #: Shares over which the bend is a difference: the root of rounding of a rate, and less in a boundary layer.
@@ -176,10 +179,19 @@ class Measuring:
         a, b = scale * totals[0], -scale * totals[1]
         size = math.hypot(a, b)
         if asked.kind == "phase":
+            if size <= self._silent(asked):
+                name = f"phase({asked.text}, {asked.harmonic:g})"
+                self.kinks.append(f"{name}: this harmonic vanishes, and has no phase")
+                return math.nan, np.full(self.motion.count, math.nan)
             turned = np.array((-b * scale, -a * scale, 0.0)).dot(slopes)
             return math.atan2(b, a), _over(turned, size**2)
         grown = np.array((a * scale, -b * scale, -size * size / self._period)).dot(slopes)
         return size, _over(grown, size)
+
+    def _silent(self, asked: Functional) -> float:
+        """Return the amplitude below which a harmonic is rounding: the even ones of a symmetric orbit are."""
+        share = max(_SILENT, _SILENT_UNITS * self.motion.orbit.model.rounding)
+        return share * Measuring(self._still, self.inside).smooth(asked.rms)[0]
 
     def _cycles(self, asked: Functional) -> int:
         """Return the number of waves of a harmonic in the period of the orbit.

@@ -114,7 +114,7 @@ def differentiated(
         )
         with np.errstate(all="ignore"):
             value, slopes = measuring.smooth(functional)
-        return NumberWithGradient(value, slopes, slopes)
+        return NumberWithGradient(value, slopes, slopes, tuple(measuring.kinks))
     found = None if directions is None else _extreme(quantity, orbit, directions)
     return found or _measured(quantity.parsed, orbit, directions, known or {})
 

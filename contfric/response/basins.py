@@ -129,17 +129,26 @@ class Basins(Tabled):
         and say nothing of the rest.
         """
         total = self.motions.size - self.missing
-        found = [(name, k, int(np.sum(self.labels == k))) for k, name in enumerate(self.names)]
-        found += [
-            (motion.name.lower(), -1, int(np.sum(self.where(motion))))
-            for motion in Motion
-            if motion is not Motion.MISSING
-        ]
         return tuple(
             Share(name, k, count, count / total, *wilson(count / total, total))
-            for name, k, count in found
-            if count
+            for name, k, there in self._parts
+            if (count := int(np.sum(there)))
         )
+
+    @cached_property
+    def of_share(self) -> NDArray[np.int32]:
+        """Number of the share that each start belongs to; -1 where it was not computed."""
+        found = np.full(self.labels.shape, -1, dtype=np.int32)
+        for number, (_, _, there) in enumerate(part for part in self._parts if np.any(part[2])):
+            found[there] = number
+        return found
+
+    @property
+    def _parts(self) -> list[tuple[str, int, NDArray[np.bool_]]]:
+        """Name, number of the orbit (-1: none), and starts, of all that may occur."""
+        orbits = [(name, k, self.labels == k) for k, name in enumerate(self.names)]
+        others = (motion for motion in Motion if motion is not Motion.MISSING)
+        return orbits + [(motion.name.lower(), -1, self.where(motion)) for motion in others]
 
     def columns(self) -> Columns:
         """Return one row for each start: its two states, orbit, name, kind of motion."""

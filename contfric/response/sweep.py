@@ -18,7 +18,7 @@ from contfric.errors import ParameterError, shown
 from contfric.models.definition import Model
 from contfric.models.shorthand.clocks import TICK
 from contfric.response.outcome import Outcome
-from contfric.response.sections import STOPS
+from contfric.response.sections import RELEASES, STOPS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -150,10 +150,13 @@ class Sweep(Tabled):
         return self.model.states.index(state)
 
     def shows(self, row: object) -> bool:
-        """Tell whether an overlay has a row of a diagram: points at a phase have none."""
+        """Tell whether an overlay has a row of a diagram: its points are where the displacement may turn."""
         if self.section == STOPS:
             return row in ROWS
-        return row == "stops" and isinstance(self.section, str) and self.section != TICK
+        model = self.model
+        walls = {reset.surface for reset in model.resets} - {TICK}
+        turning = {RELEASES, model.stop_surface, *walls} if model.stop_surface else set()
+        return row == "stops" and self.section in turning
 
     def quantity(self, row: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Yield (direction, parameter, what a diagram shows in one of its rows), for an overlay.

@@ -35,6 +35,7 @@ class RunStatus(str, Enum):
 
     DONE = "done"
     INTERRUPTED = "interrupted"
+    FAILED = "some tasks failed"
     UNWRITTEN = "some files could not be written"
 
 

@@ -100,6 +100,7 @@ class _Run:
     timings: dict[str, float] = field(default_factory=dict)
     written: list[str] = field(default_factory=list)
     failures: list[Exception] = field(default_factory=list)
+    failed: dict[str, ContfricError] = field(default_factory=dict)
     goes_on: bool = False
     before: Counts = field(default_factory=counts)
 
@@ -136,6 +137,11 @@ class _Run:
         result = self._result(record)
         if self.failures:
             raise UnwrittenError(self._failure_text(), result) from self.failures[0]
+        if self.failed:
+            text = "; ".join(f"{name}: {error}" for name, error in self.failed.items())
+            first = next(iter(self.failed.values()))
+            first.args = (f"{text} (all else is written to {self.folder.path})",)
+            raise first
         self.folder.remove_stale(self.written)
         return result
 
@@ -145,7 +151,15 @@ class _Run:
             task.ahead()
         for task in tasks:
             job = Job(self.study, self.found, self.say)
-            found = self._timed(task.name, partial(task.compute, job))
+            try:
+                found = self._timed(task.name, partial(task.compute, job))
+            except ContfricError as error:
+                if not self.found.keys() - {"orbit"}:
+                    raise
+                self.say(f"{task.name} failed: {error}")
+                self.failed[task.name] = error
+                self.status = RunStatus.FAILED
+                continue
             self.found[task.result] = found
             if task.cut_short(found):
                 raise KeyboardInterrupt
@@ -220,7 +234,7 @@ class _Run:
         record = record_of(self.plan, work, self.timings, self.found)
         record |= {
             "status": self.status.value,
-            "failures": [_one_line(error) for error in self.failures],
+            "failures": [_one_line(error) for error in (*self.failed.values(), *self.failures)],
             "files": [*self.written, RECORD],
         }
         self._write(RECORD, lambda path: write_record(path, record))

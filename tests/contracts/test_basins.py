@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -328,3 +329,29 @@ def test_the_legend_is_inside_the_figure_of_a_study(write, tmp_path: Path) -> No
     cf.run_study(path, out=tmp_path / "run")
     pixels = imread(tmp_path / "run" / "basins.png")[..., :3]
     assert (pixels[:, -4:] == 1.0).all()  # what is cut reaches the edge
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_colours_of_cells_are_those_of_the_legend(three: cf.Basins, seed: int) -> None:
+    """Any starts, of any kinds, some of them not computed."""
+    rng = np.random.default_rng(seed)
+    motions = rng.choice(np.array([*cf.Motion], dtype=object), size=three.labels.shape)
+    labels = rng.integers(-1, 3, three.labels.shape).astype(np.int32)
+    labels[motions == cf.Motion.MISSING] = -1
+    codes = np.vectorize(lambda motion: motion.code)(motions).astype(np.uint8)
+    found = replace(three, labels=labels, motions=codes)
+    ax = found.plot()
+    legend = ax.get_legend()
+    colours = {
+        text.get_text().partition(":")[0]: patch.get_facecolor()
+        for text, patch in zip(legend.get_texts(), legend.get_patches(), strict=False)
+    }
+    mesh = ax.collections[0]
+    cells = mesh.to_rgba(mesh.get_array()).reshape(*labels.T.shape, 4)
+    shown = {"no_solution": "no solution starts there"}
+    for i, k in np.ndindex(labels.shape):
+        name = found.names[labels[i, k]] if labels[i, k] >= 0 else motions[i, k].name.lower()
+        if name == "missing":
+            assert cells[k, i][3] == 0.0
+        else:
+            assert tuple(cells[k, i]) == pytest.approx(colours[shown.get(name, name)])

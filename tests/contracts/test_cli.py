@@ -122,6 +122,14 @@ def one_line(capsys) -> str:
         ("modell: coulomb\n", ":1: unknown key 'modell'; did you mean 'model'"),
         (HEAD + "range: [0.4, 0.6]\n", ":3: unknown key 'range' here: it belongs into explore, "),
         (HEAD + "seeds: {values: 3}\n", ":3: unknown key 'seeds' here: it belongs into explore"),
+        (
+            HEAD + "sweep: {parameter: Omega, range: [0.4, 0.6]}\n",
+            ":3: unknown key 'range'; key 'values' is missing: [low, high, number of values]",
+        ),
+        (
+            HEAD + "explore: {parameter: Omega, values: [0.4, 0.6]}\n",
+            ":3: unknown key 'values'; key 'range' is missing: two finite numbers [low, high]",
+        ),
         ("model: colomb\n", ":1: unknown model 'colomb'; did you mean 'coulomb'"),
         ("model: coulomb\nparams: {S: 0.5}\n", ":2: model 'coulomb' needs S0 >= S"),
         ("model: coulomb\nparams: {Omega: 0}\n", ":2: model 'coulomb' needs Omega > 0"),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.chaos.tiles import TileRows
 from contfric.ensembles.rows import Rows
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]  # those of other packages
@@ -73,3 +74,13 @@ def test_an_ensemble(executor: Executor) -> None:
 
     assert compute(executor=executor) == compute()
     assert not any("lost" in text for text in said)
+
+
+def test_a_lyapunov_map(executor: Executor) -> None:
+    def compute(**options: Any) -> bytes:
+        grid = {"Omega": np.linspace(0.3, 0.5, 8), "S": np.linspace(0.02, 0.3, 6)}
+        found = cf.lyapunov_map("coulomb", grid, {"S0": 0.4}, periods=200, tile=3, **options)
+        assert found.complete
+        return b"".join(getattr(found.rows, field.name).tobytes() for field in fields(TileRows))
+
+    assert compute(executor=executor) == compute()

@@ -316,3 +316,21 @@ def test_a_fit_that_misses_its_data_says_so(
         said = capsys.readouterr().out
         assert f"{found.reduced_chi_square:.4g} a degree of freedom" in said
         assert ("warning: the fit misses its data" in said) == bool(off)
+
+
+def test_a_fit_at_a_limit_of_the_model_says_so() -> None:
+    """Data that ask for more friction than the static one, S <= S0, and others that do not."""
+    params = {"Omega": 0.5, "S": 0.3, "S0": 0.4}
+    beyond = cf.fit("coulomb", [cf.Measured("rms(v)", 0.55, 0.01)], params, ["S"])
+    assert beyond.params["S"] == pytest.approx(0.4, abs=1e-9)
+    assert any("at a limit: the model needs S0 >= S" in note for note in beyond.notes)
+    assert "at a limit" in repr(beyond)
+    inside = cf.fit("coulomb", [cf.Measured("rms(v)", 0.525, 0.01)], params, ["S"])
+    assert inside.params["S"] < 0.39 and inside.notes == ()
+
+
+def test_what_is_no_number_is_not_fitted() -> None:
+    """The second harmonic of a symmetric orbit has no phase."""
+    params = {"Omega": 0.9, "S": 0.2, "S0": 0.25}
+    with pytest.raises(cf.ConvergenceError, match=r"phase\(x, 2\) .* is not finite.*vanishes"):
+        cf.fit("coulomb", [cf.Measured("phase(x, 2)", 0.3, 0.01)], params, ["S"])

@@ -242,3 +242,41 @@ def test_many_labels_stand_near_their_points_and_are_not_repeated() -> None:
         same = [o for o in placed if o is not label and o.get_text() == label.get_text()]
         gaps = [abs(np.subtract(*ax.transData.transform([o.xy, label.xy]))[0]) for o in same]
         assert min(gaps) > 60.0 * pixels
+
+
+def test_numbers_that_differ_by_rounding_are_drawn_as_one() -> None:
+    """The multiplier of a converter does not depend on its voltage: the axis has no digits of rounding."""
+    orbit = cf.find_orbit("buck")
+    branch = cf.continue_orbit(orbit, "E", (19.0, 21.0))
+    mu = branch.quantity("multiplier")
+    assert 0.0 < np.ptp(mu) < 1e-11 * mu.mean()
+    low, high = branch.plot(row="multiplier").get_ylim()
+    assert low < 0.9995 * mu.mean() and high > 1.0005 * mu.mean()
+    low, high = branch.plot(row="x_max").get_ylim()
+    assert high - low < 2.0 * np.ptp(branch.x_max)
+
+
+def test_a_phase_is_drawn_with_a_gap_where_it_passes_half_a_turn() -> None:
+    branch = cf.continue_orbit(cf.find_orbit("impact", {"c": 0.3}), "w", (0.9, 1.6))
+    ax = branch.plot(row="phase(x, 2)")
+    heights = [np.asarray(line.get_ydata(), dtype=float) for line in ax.lines]
+    assert min(np.nanmin(y) for y in heights) < -3.0 and max(np.nanmax(y) for y in heights) > 3.0
+    steps = np.concatenate([np.abs(np.diff(y)) for y in heights])
+    assert np.nanmax(steps) < np.pi
+
+
+def test_a_row_without_a_finite_value_says_so() -> None:
+    branch = cf.continue_orbit(cf.find_orbit("relay"), "h", (0.15, 0.25))
+    assert np.all(np.isnan(branch.quantity("phase(x, 2)")))
+    assert "no finite value" in [text.get_text() for text in branch.plot(row="phase(x, 2)").texts]
+    assert "no finite value" not in [text.get_text() for text in branch.plot(row="psi").texts]
+
+
+@pytest.mark.parametrize("model", ["belt", "coulomb", "impact"])
+def test_the_legend_of_an_orbit_hides_no_name_of_a_level(model: str) -> None:
+    ax = cf.find_orbit(model).plot()
+    ax.figure.canvas.draw()
+    legend = ax.get_legend().get_window_extent()
+    texts = [text.get_window_extent() for text in ax.texts if text.get_text()]
+    beyond = [box for box in texts if box.x0 >= ax.bbox.x1]
+    assert beyond and not any(legend.overlaps(box) for box in beyond)

@@ -568,6 +568,26 @@ def test_the_orbit_of_a_failed_run_is_saved(tmp_path, write, monkeypatch) -> Non
         assert loaded.name == "1a"
 
 
+def test_a_task_that_fails_costs_nothing_but_itself(tmp_path, write) -> None:
+    """What was found before it is written, and the tasks after it are computed."""
+    hold = "hold: {quantity: x_max, value: 99, parameters: [Omega, S], "
+    hold += "range: {Omega: [0.49, 0.51], S: [0.31, 0.33]}}\n"
+    others = "sweep: {parameter: Omega, values: [0.49, 0.51, 3], periods: 20}\n"
+    others += "fit: {free: [S], data: [{quantity: x_max, value: 1.42, sigma: 0.01}]}\n"
+    text = HEAD + "continue: {parameter: Omega, range: [0.49, 0.51]}\n" + others + hold
+    out = tmp_path / "out"
+    with pytest.raises(
+        cf.ConvergenceError, match=r"^hold: no orbit .* \(all else is written to .*out\)"
+    ):
+        cf.run_study(write(text), out)
+    assert {"points.csv", "sweep.npz", "fit.npz", "orbit.npz"} <= set(contents(out))
+    record = json.loads((out / "run.json").read_text())
+    assert record["status"] == "some tasks failed" and "x_max = 99" in record["failures"][0]
+    assert "sweep" in record and "hold" not in record
+    fine = cf.run_study(write(text.replace("99", "1.43")), out, force=True)
+    assert fine.status is RunStatus.DONE and not list(out.glob("*of-failed-run*"))
+
+
 def interrupt_at(itinerary: str):
     def progress(text: str) -> None:
         if itinerary in text:

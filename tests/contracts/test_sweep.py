@@ -193,6 +193,27 @@ def test_overlay() -> None:
     diagram.plot(row="stops", overlay=released)
     with pytest.raises(cf.ParameterError, match="draw row='stops'"):
         diagram.plot(row="psi", overlay=released)
+    loaded = cf.sweep("coulomb", "Omega", [0.45, 0.5], orbit.params, section="F+")
+    with pytest.raises(cf.ParameterError, match=r"section 'F\+': sweep.*section='stops'"):
+        diagram.plot(row="stops", overlay=loaded)
+
+
+@pytest.mark.parametrize(
+    ("model", "section", "drawn"), [("impact", "wall", 2), ("relay", "high", 0)]
+)
+def test_points_of_an_overlay_are_stops_or_impacts(model: str, section: str, drawn: int) -> None:
+    """A relay switches where its solution does not turn."""
+    name = {"impact": "w", "relay": "h"}[model]
+    orbit = cf.find_orbit(model)
+    at = orbit.params[name]
+    diagram = cf.explore(orbit, name, (0.98 * at, 1.02 * at), max_branches=1)
+    sweep = cf.sweep(model, name, [0.99 * at, 1.01 * at], section=section)
+    count = len(diagram.plot(row="stops").lines)
+    if drawn:
+        assert len(diagram.plot(row="stops", overlay=sweep).lines) == count + drawn
+    else:
+        with pytest.raises(cf.ParameterError, match="draw the sweep by itself"):
+            diagram.plot(row="stops", overlay=sweep)
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,27 @@ def test_harmonics_sum_to_the_mean_square(params: dict[str, float]) -> None:
     assert total == pytest.approx(orbit.quantity("mean(x**2)"), abs=1e-7)
 
 
+@given(PARAMS, st.sampled_from((2, 4, 6)), st.sampled_from(("x", "v", "x**3", "u + 0.1*v")))
+@settings(max_examples=15)
+def test_a_harmonic_that_vanishes_has_no_phase(
+    params: dict[str, float], harmonic: int, odd: str
+) -> None:
+    """Half a period later a symmetric orbit is its own image: what is odd has odd harmonics only."""
+    orbit = found(params)
+    if orbit is None or not orbit.symmetric:
+        return
+    even = f"({odd})**2"
+    for g, k in ((odd, harmonic), (even, harmonic - 1)):
+        phase = f"phase({g}, {k})"
+        assert np.isnan(orbit.quantity(phase))
+        gradient = orbit.gradient(phase)
+        assert "vanishes" in gradient.notes[0] and np.all(np.isnan(list(gradient.values())))
+        assert orbit.quantity(f"amplitude({g}, {k})") < 1e-12 * orbit.quantity(f"rms({g})")
+    for g, k in ((odd, 1), (even, harmonic)):
+        gradient = orbit.gradient(f"phase({g}, {k})")
+        assert not gradient.notes and np.all(np.isfinite([gradient.value, *gradient.values()]))
+
+
 QUANTITIES = (
     "x_max",
     "energy",
@@ -252,11 +273,13 @@ def test_jumps_and_poles_of_a_quantity_are_no_values_of_it(seed: int) -> None:
     plain = cf.continue_orbit(orbit, "Omega", (0.48, 0.53))
     low, high = float(plain.x_max.min()), float(plain.x_max.max())
     at, value = low + rng.uniform(0.2, 0.5) * (high - low), rng.uniform(0.5, 3.0)
+    undefined = f"0*sqrt((x_max - {at!r})**2 - {(1e-4 * (high - low)) ** 2!r})"
     far = 5.0 * value / (high - low)  # taken beyond the pole, some steps away from it
     for text, wanted, taken in [
         (f"1/(x_max - {at!r})", 0.01 * value, False),
         (f"where(x_max > {at!r}, 2, 1)", 1.5, False),
         (f"sign(x_max - {at!r})", 0.3, False),
+        (f"sign(x_max - {at!r}) + {undefined}", 0.3, False),
         (f"1/(x_max - {at!r})", far, True),
         (f"log(x_max - {at!r})", float(np.log(0.3 * (high - at))), True),
         (f"sqrt({low - 1.0!r} - x_max)", 1.0, False),

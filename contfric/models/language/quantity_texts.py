@@ -12,7 +12,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -52,6 +52,11 @@ class Functional:
     text: str
     harmonic: float = 0.0
     contacts: frozenset[str] = frozenset()
+
+    @cached_property
+    def rms(self) -> Functional:
+        """The root mean square of the same expression."""
+        return replace(self, kind="rms", harmonic=0.0)
 
     @property
     def plain(self) -> str:

@@ -90,6 +90,8 @@ class BasinsTask(Response):
         rows = [["", "starts", "share", "95 % interval"]]
         for s in entry["shares"]:
             interval = f"{s['low']:.2%} to {s['high']:.2%}"
-            rows.append([s["name"], str(s["count"]), f"{s['share']:.2%}", interval])
+            rows.append(
+                [s["name"].replace("_", " "), str(s["count"]), f"{s['share']:.2%}", interval]
+            )
         yield from aligned(rows)
         yield from incomplete(entry)

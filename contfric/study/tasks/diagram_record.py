@@ -51,7 +51,9 @@ def lines_of(record: Record) -> Iterator[str]:
     yield ""
     yield from aligned([["branch", "name", "points", name, "", "ends"], *_branch_rows(record)])
     yield ""
-    yield from aligned([["event", name, "branches", "scenario"], *_event_rows(record)])
+    events = list(_event_rows(record))
+    head = ["event", name, "branches", "scenario"]
+    yield from aligned([head, *events]) if events else ["no events"]
     yield ""
     if record["loose_ends"]:
         yield "unresolved branch ends (loose ends)"

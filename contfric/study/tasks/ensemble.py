@@ -178,7 +178,7 @@ class EnsembleTask(Response, AlongParameter):
         rows = [["event", "share", f"{name} (5 %)", "median", "95 %"]]
         for e in events[:_MOST]:
             rows.append([e["label"], f"{e['share']:.1%}", *(f"{q:.6g}" for q in e["quantiles"])])
-        yield from aligned(rows)
+        yield from aligned(rows) if events else ["no events"]
         rows = [["share", "95 % interval", "list of events"]]
         for c in classes[:_MOST]:
             interval = f"{c['low']:.1%} to {c['high']:.1%}"
