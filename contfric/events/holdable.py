@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from contfric.base.arrays import FloatArray
+from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.zero_acceleration import leaving_rate
+from contfric.events.jumps import leaving_rate, nothing_jumps
 from contfric.orbit.orbit import Orbit
+from contfric.signature.holds import ends_rest
 from contfric.simulation.starts import signs_at
 
 #: Rest that is left with less than this acceleration, or lies nearer than this to the boundary of its
@@ -19,17 +21,38 @@ class NoJump(NotationError):
 
 def check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:
     """Check that rest would be left with an acceleration: only then can it be held."""
-    jumps = not orbit.model.filippov  # else a rate is rounding, however large
-    if departs is not None and not (jumps and leaving_rate(orbit, rest, departs, joint) > NO_JUMP):
+    if departs is not None and (
+        nothing_jumps(orbit)  # else a rate is rounding, however large
+        or leaving_rate(orbit, rest, departs, joint) <= NO_JUMP
+    ):
         raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
 
 
+def vanishes_with(orbit: Orbit, location: EventFunction) -> bool:
+    """Tell whether a margin of a hold says that it has no length: one at the edge on which it begins.
+
+    A hold begins on one edge of the strip: at the limit, or, at a touch of rest, where it can just be left.
+    At the other edge it has crossed the strip, in no time to speak of where the strip is narrow.
+    """
+    own = location.segment % orbit.system.segments
+    hold = next((hold for hold in orbit.system.holds if hold.segment == own), None)
+    if hold is None:
+        return False
+    at_touch = hold.pin is None and not hold.after_rest
+    if location.margin is Margin.JOINT:
+        mode = orbit.itinerary[location.segment][0]
+        return not (at_touch and ends_rest(orbit.model, mode, location.surface))
+    return location.margin is not Margin.EXIT or at_touch
+
+
 def check_inside(orbit: Orbit, rest: str, joint: FloatArray) -> None:
-    """Check that a state lies inside the region of a rest, not on its boundary.
+    """Check that something jumps, and that a state lies inside the region of a rest, not on its boundary.
 
     A surface on which the state lies does not bound it where both of its sides are of the rest: where a mass
     rests that a gap ends at, the rate of that gap is zero.
     """
+    if nothing_jumps(orbit):
+        raise NoJump(f"'{rest}' is left without acceleration: nothing can be held there")
     model = orbit.model
     location = signs_at(model, float(joint[0]), joint[1:].copy(), orbit.vector, within=NO_JUMP)
     own = [domain.signs for domain in model.domains_of(rest)]
