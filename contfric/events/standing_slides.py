@@ -46,10 +46,12 @@ def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     Accelerations below ``least`` count as zero.
     """
     mode, exit_ = orbit.itinerary[i]
-    if is_hold(exit_) or orbit.model.mode_by_name[mode].sliding or not nothing_jumps(orbit):
+    if is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:
         return False
     at_end = EventFunction(Margin.EXIT, i, exit_)
-    if orbit.itinerary[i - 1][1] != exit_ or at_end not in orbit.system.tests:
+    if orbit.itinerary[i - 1][1] != exit_ or not nothing_jumps(orbit):
+        return False
+    if at_end not in orbit.system.tests:
         return False
     left = abs(float(orbit.margins[orbit.system.tests.index(at_end)]))
     return max(left, abs(rate_along(orbit, mode, exit_, orbit.begins[i]))) < least
