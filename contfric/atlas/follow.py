@@ -47,6 +47,7 @@ from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndRe
 from contfric.events.candidates import Candidate, sequences_of
 from contfric.events.from_simulation import solutions_near
 from contfric.events.incident import incident_forms, kinds_between
+from contfric.events.jumps import nothing_jumps
 from contfric.events.partial_touches import partial_touches
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit
@@ -115,7 +116,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
         for candidate in in_order(proposed) if composes(orbit) else proposed:
-            jumps = jumps or (candidate.has_hold and not orbit.model.filippov)
+            jumps = jumps or (candidate.has_hold and not nothing_jumps(orbit))
             if candidate.orbit is not None:
                 if (start := _start_of(candidate)) in tried:
                     continue

@@ -60,7 +60,7 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     if candidate.away is not None:
         way = _straight(candidate.away)
         branch = _leave_beside(state, orbit, way, event, settings, candidate.share)
-        return branch or _leave_together(state, orbit, event, settings)
+        return branch or leave_singular(state, orbit, event, settings)
     longest: tuple[Orbit, Side] | None = None
     for first_step in _NEAR_EVENT:
         found, stands = _longest_way(orbit, event, settings, first_step, state.progress)

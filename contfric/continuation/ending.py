@@ -16,6 +16,7 @@ from contfric.continuation.vertices import at_vertex
 from contfric.errors import NotationError
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.events.holdable import NoJump
+from contfric.events.jumps import nothing_jumps
 from contfric.events.locations import locations_of
 from contfric.events.outcomes import outcome_at
 from contfric.events.touching import entered_at, is_crossed, thrown_at
@@ -246,7 +247,7 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
     if orbit.model.composed and orbit.model.filippov:
         return "" if kind is Kind.SS else continuous
     # where nothing jumps at rest nothing does here, whichever of several margins is met first
-    if orbit.model.filippov or is_crossed(bifurcation):
+    if nothing_jumps(orbit) or is_crossed(bifurcation):
         return continuous
     for location in locations_of(bifurcation)[:1]:
         try:

@@ -187,12 +187,23 @@ def _farther(
 ) -> tuple[Point, Point]:
     """Return points as far on both sides of a fold as its step is long, or as a branch is a parabola.
 
-    A step may end so near to a fold that the parameter has changed by rounding only.
+    A step may end so near to a fold that the parameter has changed by rounding only. Of a short branch there
+    may be no orbits so far away: then half as far.
     """
     apart = max(_PARABOLA, *(abs(side.arc - point.arc) for side in sides))
-    ways = zip(sides, (apart, -apart), strict=True)
-    before, after = (point_before(orbit, point, back, settings) or side for side, back in ways)
+    before, after = (_farthest(orbit, point, side, apart, settings) for side in sides)
     return before, after
+
+
+def _farthest(orbit: Orbit, point: Point, side: Point, apart: float, settings: Settings) -> Point:
+    """Return the farthest point found on one side of another one; the side itself if there is none."""
+    near = point.arc - side.arc
+    while apart > abs(near):
+        found = point_before(orbit, point, float(np.copysign(apart, near)), settings)
+        if found is not None:
+            return found
+        apart *= 0.5
+    return side
 
 
 def _is_jump(before: Point, point: Point, after: Point) -> bool:

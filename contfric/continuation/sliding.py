@@ -13,6 +13,7 @@ from contfric.continuation.locate_change import locate_change
 from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.points import Point, Settings
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.jumps import nothing_jumps
 from contfric.events.sliding_kinds import bends_outward, hold_of_test, kind_of_margin
 from contfric.events.standing_slides import goes_nowhere
 from contfric.events.touching import is_rate_of
@@ -256,7 +257,7 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     i = test.segment
     limit = _grazed_limit(here, point, first)
     # a hold ends at a load, as rest does: nothing slides up to it
-    if limit != first or not here.model.filippov or is_hold(here.itinerary[i][1]):
+    if limit != first or is_hold(here.itinerary[i][1]) or not nothing_jumps(here):
         return limit
     if here.durations[i] <= _VANISHED * here.period:
         return first

@@ -245,18 +245,34 @@ def _changes(
     locations = locate_label(orbit, before, after, settings, k)
     if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
         locations.pop()
-    if not locations and not (
-        _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
-    ):
+    vanishes = _vanishes(orbit, k, (before, after), active)
+    if not locations and not (vanishes or _meets(orbit, k, after, active)):
         found.append(not_located(orbit, Kind.T, before, after, settings))
     for point in locations:
+        # where curves cross a trial may lie on another one
         if point.tests[: len(orbit.system.tests)].min(initial=0.0) < -_OUTSIDE:
-            continue  # where curves cross a trial may lie on another one
+            continue
+        if vanishes and _stays(orbit, k, point, (before, after), settings):
+            continue
         here = point.orbit(orbit, active)
         test = EventFunction(*_label_location(orbit, k))
         b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
         found.append((b, point))
     return found
+
+
+def _stays(
+    orbit: Orbit, k: int, point: Point, ends: tuple[Point, Point], settings: Settings
+) -> bool:
+    """Tell whether a label is the same half the way from a located change to either end of its step."""
+    active, labels = orbit.model.index_of(settings.parameter), set()
+    for end in ends:
+        moved = point.along(orbit, active, 0.5 * (end.arc - point.arc))
+        near = first_point(moved, settings, point.tangent, point.slope)
+        if near is None:
+            return False
+        labels.add(int(near.labels[k]))
+    return len(labels) == 1
 
 
 def _undone(

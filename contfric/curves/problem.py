@@ -15,6 +15,7 @@ from contfric.bvp.system import EventFunction, Margin, System
 from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
+from contfric.events.jumps import nothing_jumps
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.events.touching import rest_at
 from contfric.models.definition import Model
@@ -219,7 +220,7 @@ def _tangential(test: EventFunction, orbit: Orbit) -> EventFunction | None:
     """Return the exit whose tangency is the same condition as a margin at its joint; None if none is."""
     model, itinerary = orbit.model, orbit.system.itinerary
     if test.margin is not Margin.JOINT or not (
-        model.filippov or model.reset_at(*itinerary[test.segment]) is not None
+        nothing_jumps(orbit) or model.reset_at(*itinerary[test.segment]) is not None
     ):
         return None
     exits = (

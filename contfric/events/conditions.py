@@ -38,6 +38,7 @@ from contfric.bvp.linear import jacobian_blocks, linearised
 from contfric.bvp.system import EventFunction, Margin
 from contfric.events.gradients import closing, gradient_of
 from contfric.events.incident import vanishing
+from contfric.events.jumps import nothing_jumps
 from contfric.events.outcomes import NEARLY_NO_LENGTH
 from contfric.events.unit import Form
 from contfric.orbit.orbit import Orbit
@@ -229,8 +230,8 @@ def _without_slides(form: Form) -> tuple[Form, tuple[Parted, ...]]:
             continue
         held = is_hold(first) and last == TOUCH
         if not held:
-            rests = model.filippov and mode == then and not (is_hold(first) or is_hold(last))
-            if not (rests and ends_rest(model, mode, first)):
+            rests = mode == then and not (is_hold(first) or is_hold(last))
+            if not (rests and ends_rest(model, mode, first) and nothing_jumps(form.orbit)):
                 continue
             itinerary[h] = mode, last
         # what parts the rest after the slide parts this one now; a hold is parted once

@@ -7,7 +7,9 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.zero_acceleration import left_to, touch_of
+from contfric.events.holdable import vanishes_with
+from contfric.events.jumps import left_to
+from contfric.events.zero_acceleration import touch_of
 from contfric.orbit.orbit import Orbit
 
 #: A hold this short is one that vanishes: what its margins say is its length.
@@ -36,7 +38,7 @@ def gradient_of(
     i, m = location.segment, orbit.joints.shape[1]
     gradient, slope = np.zeros((count + 1, m)), 0.0
     held = next((hold for hold in orbit.system.holds if hold.segment == i), None)
-    short = held is not None and orbit.durations[i] < _SHORT
+    short = orbit.durations[i] < _SHORT and vanishes_with(orbit, location)
     if location.margin is Margin.LASTING or short:
         gradient[i + 1, 0], gradient[i, 0] = 1.0, -1.0
         return gradient, slope

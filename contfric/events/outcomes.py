@@ -44,7 +44,8 @@ from contfric.errors import NotationError
 from contfric.events import standing_slides as slides
 from contfric.events.bifurcation import Kind
 from contfric.events.contact_outcomes import continuous_edit
-from contfric.events.holdable import NoJump, check_held, check_inside, left_at_rest, rest_mode
+from contfric.events.holdable import NoJump, check_held, check_inside, rest_mode, vanishes_with
+from contfric.events.jumps import leaves_smoothly
 from contfric.events.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.events.zero_acceleration import (
     first_zero_acceleration,
@@ -154,8 +155,12 @@ def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Successor:
     if slides.goes_nowhere(orbit, j):
         return Successor(*slides.left_out(orbit, j))
     rest = rest_mode(orbit, i, itinerary[i][1])
-    check_held(orbit, rest, release_mode(model, rest, location.surface), orbit.ends[i])
-    if model.lies_on(itinerary[j][0], itinerary[i][1]):
+    departs = release_mode(model, rest, location.surface)
+    rests = model.lies_on(itinerary[j][0], itinerary[i][1])
+    if rests and departs is not None and slides.turns_back(orbit, i, location.surface):
+        return Successor(*slides.slip_at_stop(orbit, i, rest, departs))
+    check_held(orbit, rest, departs, orbit.ends[i])
+    if rests:
         return _stick_becomes_hold(orbit, j, hold_at(location.surface), location.surface)
     edit = insert(i, (rest, hold_at(location.surface)))
     reason = f"hold at stop {i + 1}, on {location.surface}, instead of the reversal"
@@ -200,7 +205,7 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
     j = (i + 1) % len(itinerary)
     touch = touch_of(orbit, i, location.surface)
     departs = _released(model, mode, location.surface)
-    if left_at_rest(model, mode, departs):
+    if leaves_smoothly(orbit, mode, departs):
         return Successor(*slides.slip_at_touch(orbit, i, location.surface, departs, touch))
     check_held(orbit, mode, departs, touch)
     reason = f"hold after the touch of {location.surface} in stick {i + 1}"
@@ -239,7 +244,7 @@ def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:
     mode, exit_ = orbit.itinerary[i]
     touch = touch_of(orbit, i, location.surface)
     rest = rest_mode(orbit, i, location.surface)
-    if left_at_rest(orbit.model, rest, mode):
+    if leaves_smoothly(orbit, rest, mode):
         return Successor(*slides.stick_at_touch(orbit, i, location.surface, rest, touch))
     check_inside(orbit, rest, touch)
     edit = split(i, location.surface, (rest, TOUCH), (mode, exit_))
@@ -288,7 +293,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     after_rest = ends_rest(orbit.model, *itinerary[before])
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
-    if orbit.durations[h] < no_length * time_unit(orbit):
+    if orbit.durations[h] < no_length * time_unit(orbit) and vanishes_with(orbit, location):
         reason = f"hold {h + 1} vanishes"
         if at_touch and not after_rest:  # the slide goes on
             return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)

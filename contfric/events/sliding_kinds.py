@@ -38,6 +38,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.holds import Hold
 from contfric.bvp.system import EventFunction, Margin, System, inside_sign
 from contfric.events.bifurcation import Kind
+from contfric.events.jumps import nothing_jumps
 from contfric.events.touching import (
     chosen_at,
     is_corner,
@@ -102,12 +103,12 @@ def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:
     rounding: the event is what its beginning is.
     """
     k, itinerary = test.segment, orbit.itinerary
-    if not orbit.model.filippov or len(itinerary) < 3:
+    if len(itinerary) < 3:
         return None
     before, behind = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
     vanished = bool(orbit.durations[k] < _VANISHED * orbit.period)
-    return (k - 1) % len(itinerary) if same and vanished else None
+    return (k - 1) % len(itinerary) if same and vanished and nothing_jumps(orbit) else None
 
 
 def _kind_of_touch(model: Model, mode: str, surface: str) -> Kind:

@@ -16,11 +16,12 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
 from contfric.events.contact_outcomes import Joints, Speeds
-from contfric.events.holdable import NO_JUMP, NoJump, left_at_rest
-from contfric.events.touching import rate_along
+from contfric.events.holdable import NO_JUMP, NoJump
+from contfric.events.jumps import leaves_smoothly, nothing_jumps
+from contfric.events.touching import rate_along, rate_scale
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
-from contfric.signature.edits import Edit, drop, split
+from contfric.signature.edits import Edit, drop, insert, split
 from contfric.signature.holds import is_hold, left_surface
 from contfric.simulation.starts import signs_at
 
@@ -45,10 +46,12 @@ def goes_nowhere(orbit: Orbit, i: int, least: float = STANDS) -> bool:
     Accelerations below ``least`` count as zero.
     """
     mode, exit_ = orbit.itinerary[i]
-    if not orbit.model.filippov or is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:
+    if is_hold(exit_) or orbit.model.mode_by_name[mode].sliding:
         return False
     at_end = EventFunction(Margin.EXIT, i, exit_)
-    if orbit.itinerary[i - 1][1] != exit_ or at_end not in orbit.system.tests:
+    if orbit.itinerary[i - 1][1] != exit_ or not nothing_jumps(orbit):
+        return False
+    if at_end not in orbit.system.tests:
         return False
     left = abs(float(orbit.margins[orbit.system.tests.index(at_end)]))
     return max(left, abs(rate_along(orbit, mode, exit_, orbit.begins[i]))) < least
@@ -76,8 +79,7 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
     short = bool(lasts < _TOUCHES * time_unit(orbit))
     pairs = (itinerary[j][0], before), (before, itinerary[j][0])
-    rests = any(left_at_rest(orbit.model, rest, beside) for rest, beside in pairs)
-    return same and short and rests
+    return same and short and any(leaves_smoothly(orbit, *pair) for pair in pairs)
 
 
 def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, Joints, str]:
@@ -112,6 +114,29 @@ def slip_at_touch(orbit: Orbit, i: int, surface: str, departs: str, touch: Float
     inside = departs, left_surface(orbit.model, mode, departs)
     reason = f"slip at the touch of {surface} in stick {i + 1}"
     return _opening(orbit, i, (surface, touch), inside, _SLIPS, reason)
+
+
+def turns_back(orbit: Orbit, i: int, limit: str) -> bool:
+    """Tell whether a rest after stop ``i`` begins at its limit and leaves it at once, where nothing jumps.
+
+    Beyond the limit there is a slide, as long as the load is beyond it. (One whose load is moved by nothing
+    else lasts half a natural period, however small it is.)
+    """
+    rest = orbit.itinerary[(i + 1) % len(orbit.itinerary)][0]
+    rate = rate_along(orbit, rest, limit, orbit.ends[i])
+    return abs(rate) > STANDS * rate_scale(orbit, rest, limit) and nothing_jumps(orbit)
+
+
+def slip_at_stop(orbit: Orbit, i: int, rest: str, departs: str) -> Opening:
+    """Return what lets rest after stop ``i`` begin with a slide of no length, where it is at its limit.
+
+    The acceleration ``w - k t`` of a slide from a load that is beyond its limit by w falls: it ends at
+    ``2 w / k``, where its velocity does.
+    """
+    inside = departs, left_surface(orbit.model, rest, departs)
+    behind = (i + 1) % len(orbit.itinerary)
+    reason = f"slide at stop {i + 1}, whose load is at its limit, before rest"
+    return insert(i, inside), {(i, 0): orbit.ends[i]}, reason, {(behind, -1): 1.0}
 
 
 def stick_at_touch(orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray) -> Opening:

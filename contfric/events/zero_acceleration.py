@@ -12,11 +12,12 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.bvp.system import inside_sign, mode_domains
+from contfric.bvp.system import inside_sign
 from contfric.errors import NotationError
+from contfric.events.jumps import left_to, nothing_jumps
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import state_within, stationary_within
-from contfric.signature.holds import is_hold, left_surface
+from contfric.signature.holds import is_hold
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it
 #: would be left with depends on them monotonically, one would be enough, as in every model of a load.
@@ -86,20 +87,6 @@ def _departure_rate(orbit: Orbit, i: int, departs: str) -> Callable[[float], flo
         )
 
     return rate
-
-
-def left_to(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
-    """Return the side to which a rest is left into a departing mode, and the observable that tells."""
-    model = orbit.model
-    leaves = left_surface(model, mode, departs)
-    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
-    return sign, model.surface_by_name[leaves].observable
-
-
-def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
-    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
-    sign, observable = left_to(orbit, mode, departs)
-    return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
 
 
 def joint_within(orbit: Orbit, i: int, time: float) -> FloatArray:
@@ -190,10 +177,10 @@ def _slides_off(orbit: Orbit, i: int, surface: str) -> bool:
     """
     before, exit_ = orbit.itinerary[i - 1]
     return (
-        orbit.model.filippov
-        and not is_hold(exit_)
+        not is_hold(exit_)
         and exit_ != surface
         and orbit.model.lies_on(before, surface)
+        and nothing_jumps(orbit)
     )
 
 

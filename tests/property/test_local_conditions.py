@@ -13,14 +13,18 @@ from contfric.bvp.margins import Margin
 from contfric.continuation.branch import Branch
 from contfric.events.bifurcation import Kind
 from contfric.events.conditions import Relation, possible, relation_of
+from contfric.events.gradients import gradient_of
 from contfric.events.incident import incident_forms, vanishing
 from contfric.events.locations import normal_location
+from contfric.signature.holds import is_hold
 
 #: In diagrams near this one, in zeta, a hold can just not be left inside any more.
 HELD = {"Omega": 0.12784, "S": 0.020946, "S0": 0.046345, "h": 0.04157, "zeta": 0.00483}
 WIDTH = 0.06
 #: In its diagram, in h, slides stop tangentially.
 STOPS = {"Omega": 0.224148285, "S": 0.40331387, "S0": 0.88561545, "h": 0.276719682, "zeta": 1e-7}
+#: In diagrams near this one, in zeta, the strip between the limits is narrow: holds cross it in no time.
+NARROW = {"Omega": 0.10107, "S": 0.088966, "h": 0.12774, "zeta": 0.00155}
 #: A rate this large at an exit is the root of what an event is located to.
 ROOT = 1e-8
 
@@ -142,3 +146,32 @@ def test_each_sequence_is_told_by_its_own_relations(seed: int) -> None:
     alone = [possible([relation], [(0,)])[0] for relation in relations]
     often = [replace(r, margins=np.repeat(r.margins, 5, axis=0)) for r in relations]
     assert possible(relations, chosen) == possible(often, chosen) == alone
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_margins_of_holds_across_a_narrow_strip(seed: int) -> None:
+    """However short such a hold is, its load at the other edge has the gradient of differences."""
+    rng = np.random.default_rng([9, seed])
+    params = {name: value * (1.0 + rng.uniform(-0.01, 0.01)) for name, value in NARROW.items()}
+    params["S0"] = params["S"] * (1.0 + 10.0 ** rng.uniform(-3.6, -3.0))
+    orbit = cf.find_orbit("coulomb", params, longest=1000)
+    found = cf.explore(orbit, "zeta", (-0.03, 0.03), max_branches=60)
+    active, asked = found.model.index_of("zeta"), 0
+    for event in found.bifurcations:
+        orbit = event.orbit.as_whole()
+        for test in event.tests:
+            i, count = test.segment, len(orbit.itinerary)
+            short = is_hold(orbit.itinerary[i][1]) and orbit.durations[i] < 1e-3
+            if not (short and test.margin is Margin.JOINT and i + 1 < count):
+                continue
+            told = gradient_of(orbit, test, count, active)
+            assert told is not None
+            k, moves = orbit.system.tests.index(test), []
+            for component in range(orbit.joints.shape[1]):
+                step = np.zeros(orbit.joints.shape)
+                step[i + 1, component] = 1e-5
+                near = [replace(orbit, joints=orbit.joints + s * step) for s in (1.0, -1.0)]
+                moves.append((near[0].margins[k] - near[1].margins[k]) / 2e-5)
+            assert told[0][i + 1] == pytest.approx(moves, abs=1e-8)
+            asked += 1
+    assert asked

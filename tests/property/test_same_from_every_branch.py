@@ -19,14 +19,21 @@ from contfric.events.incident import Name, kinds_between
 
 #: A bridge turns over 1e-8 of its range.
 FOLD = {"Omega": 0.07742262128103025, "S0": 0.13762082006748685, "h": 0.0, "zeta": 1e-9}
+#: A bridge turns, and ends on both sides of its fold within a usual step.
+SHORT = {
+    "Omega": 0.08455978673933087,
+    "S": 0.06637008905438091,
+    "S0": 0.12664371489538423,
+    "zeta": -0.005,
+}
 #: An asymmetric branch touches u = 0 next to the point at which it becomes symmetric.
 TOUCH = {"Omega": 0.3390492697931732, "S": 0.09820819315675781, "S0": 0.19211709392812384, "h": 0.0}
 #: Two holds of a bridge over three periods touch their limit together.
 HOLDS = {"Omega": 0.3599045472299525, "S": 0.1533706969500193, "S0": 0.36969068182533193}
 
 
-def _slow_fold(monkeypatch):
-    """Return what a bridge that hardly turns is asked at its fold, with the located point."""
+def _bridge_folds(monkeypatch, params, parameter, bounds):
+    """Return what bridges that hardly turn are asked at their folds, with the located points."""
     asked = []
 
     def located(orbit, before, after, beyond, point, settings):
@@ -36,14 +43,15 @@ def _slow_fold(monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(smooth, "fold_at", located)
-        orbit = cf.find_orbit("coulomb", {**FOLD, "S": 0.0810880207884525}, longest=1000)
-        cf.explore(orbit, "S", (0.0720337655, 0.0903702620), max_branches=12)
+        orbit = cf.find_orbit("coulomb", params, longest=1000)
+        cf.explore(orbit, parameter, bounds, max_branches=40)
     return asked
 
 
 def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
     rng = np.random.default_rng(5)
-    asked = _slow_fold(monkeypatch)
+    params = {**FOLD, "S": 0.0810880207884525}
+    asked = _bridge_folds(monkeypatch, params, "S", (0.0720337655, 0.0903702620))
     assert asked
     for orbit, point, settings in asked:
         here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
@@ -58,6 +66,22 @@ def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
         monkeypatch.setattr("contfric.continuation.folds._farther", lambda _o, _p, sides, _s: sides)
         assert not fold_at(orbit, before, rising, rising, point, settings)
         monkeypatch.undo()
+
+
+def test_a_fold_of_a_short_branch_is_one_however_near_to_it_a_step_ends(monkeypatch):
+    """So far away as its parabola is told from rounding in general there are no orbits of it."""
+    rng, told = np.random.default_rng(6), 0
+    for orbit, point, settings in _bridge_folds(monkeypatch, SHORT, "zeta", (-0.012, 0.0)):
+        here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
+        if point.arc < 1e-4:
+            continue  # at an event, next to which slopes are rounding
+        for _ in range(4):
+            near, far = 10.0 ** rng.uniform(-7.0, -5.0), 10.0 ** rng.uniform(-4.0, -3.0)
+            before, after = (point_before(here, point, back, settings) for back in (far, -near))
+            found = fold_at(orbit, before, after, after, point, settings)
+            assert [event.kind for event, _ in found] == [Kind.SN]
+            told += 1
+    assert told
 
 
 @pytest.mark.parametrize("seed", range(4))

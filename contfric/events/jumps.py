@@ -1,0 +1,112 @@
+"""Whether rest is left with an acceleration: else nothing jumps, as in a system of Filippov.
+
+Some models have no such acceleration (:attr:`contfric.models.definition.Model.filippov`). Others have none
+at some of their parameters: where the static limit equals the kinetic one (S0 = S) there is no load at which
+a mass may either stay or leave. Then nothing can be held, and the solution is continuous at CS, SS, AS, GS.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from contfric.base.arrays import FloatArray
+from contfric.bvp.system import mode_domains
+from contfric.events.touching import is_rate_of
+from contfric.models.definition import Model
+from contfric.orbit.orbit import Orbit
+from contfric.signature.holds import ends_rest, left_surface, release_mode
+
+#: An acceleration this small, as a share of the largest at the joints of an orbit, is rounding: limits that
+#: are equal differ by 1e-16, and the flow's derivatives are known to 1e-14.
+_ROUNDING = 1e-12
+#: Joints of an orbit that are moved to a limit: what a single one says may be an accident.
+_JOINTS = 6
+#: Steps of Newton's method for a state at the limit: a load is linear in the state in nearly every model.
+_STEPS = 5
+#: A state that is this near to its surfaces, relative to their levels, lies on them.
+_MET = 1e-12
+
+
+def leaves_smoothly(orbit: Orbit, rest: str, departs: str) -> bool:
+    """Tell whether a rest is left to a mode without acceleration, at the parameters of an orbit."""
+    return left_at_rest(orbit.model, rest, departs) or nothing_jumps(orbit)
+
+
+@cache
+def left_at_rest(model: Model, rest: str, departs: str) -> bool:
+    """Tell whether rest is left to a mode without acceleration: the solution does not jump where it begins.
+
+    So it is everywhere in some models. In others there are contacts that jump, and Jenkins elements that do
+    not: the stretch of one that slips rests at its limit until its rate, the velocity, vanishes.
+    """
+    if model.filippov:
+        return True
+    leaves = [
+        is_rate_of(model, model.domain_by_name[target].mode, on, back)
+        for domain in model.domains_of(rest)
+        for on in (name for name, side in domain.signs.items() if side == 0)
+        if not model.lies_on(departs, on)
+        for back, target in model.exits_of(domain.name)
+        if not model.lies_on(model.domain_by_name[target].mode, on)
+    ]
+    return bool(leaves) and all(leaves)
+
+
+def nothing_jumps(orbit: Orbit) -> bool:
+    """Tell whether rest is left without acceleration wherever it ends, at the parameters of an orbit."""
+    model = orbit.model
+    if model.filippov or model.composed:
+        return model.filippov
+    rests = [d for d in model.domains if model.mode_by_name[d.mode].sliding]
+    ends = {(d.mode, s) for d in rests for s, _ in model.exits_of(d.name)}
+    limits = [(mode, s) for mode, s in sorted(ends) if ends_rest(model, mode, s)]
+    return bool(limits) and all(_left_without(orbit, mode, s) for mode, s in limits)
+
+
+def _left_without(orbit: Orbit, mode: str, limit: str) -> bool:
+    """Tell whether a rest is left without acceleration where its load is at a limit."""
+    departs = release_mode(orbit.model, mode, limit)
+    if departs is None:
+        return False
+    cycle, leaves = orbit.cycle, left_surface(orbit.model, mode, departs)
+    chosen = cycle[np.linspace(0, len(cycle) - 1, min(_JOINTS, len(cycle))).astype(int)]
+    scale = max(abs(leaving_rate(orbit, mode, departs, joint)) for joint in chosen)
+    asked = False
+    for joint in chosen:
+        there = _moved(orbit, joint, (leaves, limit))
+        if there is None:
+            continue
+        if abs(leaving_rate(orbit, mode, departs, there)) > _ROUNDING * scale:
+            return False
+        asked = True
+    return asked
+
+
+def _moved(orbit: Orbit, joint: FloatArray, surfaces: tuple[str, ...]) -> FloatArray | None:
+    """Return the nearest joint at the same time that lies on surfaces; None if Newton's method finds none."""
+    flow, time, state = orbit.flow, float(joint[0]), joint[1:].copy()
+    names = [orbit.model.surface_by_name[s].observable for s in surfaces]
+    levels = np.array([flow.level(s) for s in surfaces])
+    for _ in range(_STEPS):
+        over = np.array([flow.observe(name, time, state) for name in names]) - levels
+        if float(np.max(np.abs(over))) <= _MET * float(np.max(np.abs(levels), initial=1.0)):
+            return np.concatenate([[time], state])
+        slopes = np.array([flow.gradient(name, time, state)[1 : len(joint)] for name in names])
+        state -= np.linalg.lstsq(slopes, over, rcond=None)[0]
+    return None
+
+
+def left_to(orbit: Orbit, mode: str, departs: str) -> tuple[int, str]:
+    """Return the side to which a rest is left into a departing mode, and the observable that tells."""
+    model = orbit.model
+    leaves = left_surface(model, mode, departs)
+    sign = model.domain_by_name[mode_domains(model, departs)[0]].signs[leaves]
+    return sign, model.surface_by_name[leaves].observable
+
+
+def leaving_rate(orbit: Orbit, mode: str, departs: str, joint: FloatArray) -> float:
+    """Return the acceleration with which a mode of rest is left into a departing mode at a joint."""
+    sign, observable = left_to(orbit, mode, departs)
+    return sign * orbit.flow.rate(departs, observable, float(joint[0]), joint[1:])
