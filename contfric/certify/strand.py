@@ -124,7 +124,7 @@ class Strand:
             return {}
         found = {}
         for k, point in enumerate(points):
-            if not point.enclosure or point.orbit.system is not self.branch[k].system:
+            if not point.enclosure or point.orbit.system.half != self.branch.system.half:
                 continue
             value, m = arb(float(self.branch.values[k])), self.segments.states + 1
             period = self._model(value).period
