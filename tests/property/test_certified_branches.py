@@ -13,7 +13,9 @@ from flint import arb, ctx
 
 import contfric as cf
 from contfric.base.arrays import FloatArray
-from contfric.certify import tracing
+from contfric.bvp.margins import EventFunction, Margin
+from contfric.bvp.system import build_system
+from contfric.certify import locating, tracing
 from contfric.certify.branch import certify_branch, cover
 from contfric.certify.chain import Chain, segments_of
 from contfric.certify.inequalities import RATE
@@ -500,3 +502,37 @@ def test_events_of_branches_without_excitation_solve_their_equations() -> None:
             assert all(x.contains(0) and x.rad() < 1e-25 for x in chain.residual(zero[:-1]))
             off = [float(x) - y for x, y in zip(zero, fold.orbit.joints.ravel(), strict=False)]
             assert np.abs(off).max() < 1e-6
+
+
+@pytest.mark.parametrize("turns", [1, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_shortest_problem_of_a_cycle_without_excitation(seed: int, turns: int) -> None:
+    """Its turn ends at time 0, whether it is half of a symmetric orbit or one of several turns."""
+    rng = np.random.default_rng(seed)
+    orbit = cf.find_orbit("relay-sliding", {"lam": rng.uniform(0.054, 0.08)}).as_whole()
+    model, period, cycle = orbit.model, orbit.period, orbit.cycle
+    joints = np.concatenate([cycle - [k * period, 0, 0, 0] for k in range(turns)][::-1])
+    system = build_system(model, orbit.itinerary * turns, turns)
+    last = len(joints) - 1  # of several turns one inequality is looked at in each
+    tests = tuple(
+        EventFunction(Margin.INTERIOR, k, "switch") for k in range(last % len(cycle), last + 1, 4)
+    )
+    whole = replace(orbit, system=system, joints=joints)
+    short, _ = locating._shortest(whole, tests)
+    assert short.system.half and len(short.joints) == len(cycle) // 2
+    chain = Chain(segments_of(short.system), ball_model(model, short.params))
+    off = chain.residual([arb(float(c)) for c in short.joints.ravel()])
+    assert max(abs(float(c)) for c in off) < 1e-9
+
+
+def test_touches_of_symmetric_cycles_without_excitation_are_proved() -> None:
+    """Of relay feedback with sliding: a slide that touches its limit, and an arc that touches the switch."""
+    diagram = cf.explore(cf.find_orbit("relay-sliding"), "lam", (0.049, 0.0556), max_branches=2)
+    proofs = {event.label: event.certify("lam") for event in diagram.bifurcations}
+    assert {"AS_s", "GS_s"} <= set(proofs)
+    for label in ("AS_s", "GS_s"):
+        assert proofs[label].proved, proofs[label].why
+        assert proofs[label].radius < 1e-25 and proofs[label].error < 1e-10
+    (between,) = [branch for branch in diagram.branches if branch.name.startswith("2s")]
+    certificate = between.certify()
+    assert certificate.complete and set(certificate.events) == {"AS_s", "GS_s"}
