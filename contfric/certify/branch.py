@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -182,8 +182,23 @@ class BranchCertificate(Shown):
         )
 
 
+def certify_points(
+    branch: Branch, until: float = math.inf, inside: bool = True
+) -> list[Certificate]:
+    """Prove the printed orbits of a branch, each by itself; see :func:`certify_orbit`."""
+    points = list[Certificate]()
+    for orbit in branch:
+        if time.time() > until:
+            break
+        points.append(certify_orbit(orbit, inside, until))
+    return points
+
+
 def certify_branch(
-    branch: Branch, until: float = math.inf, progress: Callable[[str], None] | None = None
+    branch: Branch,
+    until: float = math.inf,
+    progress: Callable[[str], None] | None = None,
+    points: Sequence[Certificate] | None = None,
 ) -> BranchCertificate:
     """Prove what can be proved of a branch.
 
@@ -191,6 +206,9 @@ def certify_branch(
     ----------
     until : when to end, by ``time.time``; what is left then is listed as such
     progress : called with one line of text now and then
+    points : certificates of its printed orbits, if they are known. If not, all but their inequalities is
+        proved first; those hold in the tube, and are looked at where there is none. With a time limit they
+        may not come to it, so that all of an orbit is proved first.
 
     Raises
     ------
@@ -206,11 +224,8 @@ def certify_branch(
     """
     like = branch[len(branch) // 2]
     proofs = [certify_event(event, branch.parameter, until, like) for event in branch.bifurcations]
-    points = []
-    for orbit in branch:
-        if time.time() > until:
-            break
-        points.append(certify_orbit(orbit, inside=False, until=until))
+    if points is None:
+        points = certify_points(branch, until, inside=until < math.inf)
     with working(_BITS):
         tracer = Tracer(branch, proofs, until, points)
         pieces = cover(tracer, progress)

@@ -2,6 +2,8 @@
 
 Mirror images of branches are not proved again and not counted: the symmetry of the model makes them
 of the others. Branches and events are independent of each other, so that any executor may prove them.
+With a time limit what is cheap comes first: events, the printed orbits of all branches, and then the tubes,
+those of few points and segments first.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from functools import partial
 from typing import Any
 
 from contfric.atlas.diagram import Diagram
-from contfric.certify.branch import BranchCertificate, certify_branch
+from contfric.certify.branch import BranchCertificate, certify_branch, certify_points
+from contfric.certify.certificate import Certificate
 from contfric.certify.diagram_certificate import (
     BranchSummary,
     DiagramCertificate,
@@ -32,16 +35,32 @@ from contfric.continuation.branch import Branch
 from contfric.events.bifurcation import Bifurcation
 from contfric.models.balls.build import ball_model
 
-_INTERRUPTED = "interrupted"
+_INTERRUPTED, _ALL = "interrupted", "branches and events"
 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A branch or an event to prove, until some time (that of ``time.time``)."""
+    """A branch or an event to prove, until some time (that of ``time.time``).
+
+    Attributes
+    ----------
+    points : certificates of the printed orbits of a branch, if they are known
+    only_points : whether nothing else of a branch is to be proved
+    """
 
     what: Branch | Bifurcation
     parameter: str
     until: float
+    points: tuple[Certificate, ...] | None = None
+    only_points: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Proved:
+    """What was proved of a branch or an event, and of a branch its tubes for a file."""
+
+    proof: BranchCertificate | EventCertificate
+    tubes: tuple[dict[str, Any], ...] = ()
 
 
 def certify_diagram(
@@ -67,7 +86,8 @@ def certify_diagram(
     things: list[Branch | Bifurcation] = [node.bifurcation for node in nodes]
     things += [branch for _, branch in branches]
     tasks = {k: _Task(thing, diagram.parameter, until) for k, thing in enumerate(things)}
-    found, ended = _proved(tasks, executor, progress or _silent)
+    results, ended = _proved(dict(sorted(tasks.items(), key=_cost)), executor, progress or _silent)
+    found: dict[int, Any] = {k: result.proof for k, result in results.items()}
     late = [k for k in tasks if k not in found or bool(found[k].ended)]
     if late and not ended and time_limit is not None and time.time() > until:
         ended = f"the time limit of {time_limit:g} s ended the run"
@@ -96,15 +116,15 @@ def certify_diagram(
         ended,
         (
             *(part for parts, _ in written.values() for part in parts),
-            *(tube for k in tasks for tube in _tubes(found.get(k), until)),
+            *(tube for k in sorted(results) for tube in results[k].tubes),
         ),
     )
 
 
-def _tubes(
-    proof: BranchCertificate | EventCertificate | None, until: float
-) -> list[dict[str, Any]]:
-    return tubes_of(proof, until) if isinstance(proof, BranchCertificate) else []
+def _cost(numbered: tuple[int, _Task]) -> int:
+    """Return what a proof costs, roughly, to do the cheap ones first: boxes grow with points and segments."""
+    what = numbered[1].what
+    return len(what) * len(what.system.itinerary) ** 2 if isinstance(what, Branch) else 0
 
 
 def _silent(_: str) -> None:
@@ -120,20 +140,31 @@ def _parts(late: list[int], events: int) -> str:
 
 def _proved(
     tasks: dict[int, _Task], executor: Executor | None, progress: Progress
-) -> tuple[dict[int, Any], str]:
-    """Return what was found by number of the task, and what ended the run early."""
-    found: dict[int, Any] = {}
+) -> tuple[dict[int, _Proved], str]:
+    """Return what was proved by number of the task, and what ended the run early."""
+    found, points = dict[int, Any](), dict[int, Any]()
+    branches = {number: task for number, task in tasks.items() if isinstance(task.what, Branch)}
+    events = {number: task for number, task in tasks.items() if number not in branches}
+
+    def fill(results: dict[int, Any], some: dict[int, _Task], what: str) -> None:
+        for number, result in _results(some, executor, progress):
+            if result is not None:
+                results[number] = result
+            progress(f"{len(results)} of {len(tasks)} {what}")
+
     try:
-        for number, certificate in _certificates(tasks, executor, progress):
-            if certificate is not None:
-                found[number] = certificate
-            progress(f"{len(found)} of {len(tasks)} branches and events")
+        fill(found, events, _ALL)
+        if any(task.until < math.inf for task in branches.values()):
+            first = {number: replace(task, only_points=True) for number, task in branches.items()}
+            fill(points, first, "printed orbits of branches")
+        known = {k: replace(task, points=points.get(k)) for k, task in branches.items()}
+        fill(found, known, _ALL)
     except KeyboardInterrupt:
         return found, _INTERRUPTED
     return found, ""
 
 
-def _certificates(
+def _results(
     tasks: dict[int, _Task], executor: Executor | None, progress: Progress
 ) -> Iterator[tuple[int, Any]]:
     if executor is not None:
@@ -141,7 +172,7 @@ def _certificates(
         return
     # one after the other: the precision of flint belongs to the whole process
     for number, task in tasks.items():
-        heard = partial(_within, progress, f"{number + 1} of {len(tasks)} branches and events")
+        heard = partial(_within, progress, f"{number + 1} of {len(tasks)} {_ALL}")
         yield number, prove(task, progress=heard)
 
 
@@ -151,13 +182,16 @@ def _within(progress: Progress, before: str, text: str) -> None:
 
 def prove(
     task: _Task, stop: object = None, progress: Callable[[str], None] | None = None
-) -> BranchCertificate | EventCertificate | None:
-    """Prove a branch or an event; None if the time was over before it began."""
-    if time.time() > task.until:
+) -> _Proved | tuple[Certificate, ...] | None:
+    """Prove a branch or an event, or printed orbits only; None if the time was over before it began."""
+    if time.time() > task.until and task.points is None:
         return None
-    if isinstance(task.what, Branch):
-        return certify_branch(task.what, until=task.until, progress=progress)
-    return certify_event(task.what, task.parameter, task.until)
+    if isinstance(task.what, Bifurcation):
+        return _Proved(certify_event(task.what, task.parameter, task.until))
+    if task.only_points:
+        return tuple(certify_points(task.what, task.until))
+    proof = certify_branch(task.what, task.until, progress, task.points)
+    return _Proved(proof, tuple(tubes_of(proof, task.until)))
 
 
 def _written(

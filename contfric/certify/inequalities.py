@@ -48,6 +48,8 @@ class Touch:
 
 #: What an inequality is about.
 DURATION, JOINT, EXIT, INSIDE, ENTRY = "duration", "joint", "exit", "inside", "entry"
+#: The rate with which an observable leaves 0 at the start: a part of what is asked for inside.
+RATE = "rate at the start"
 
 
 class InequalityName(NamedTuple):
@@ -102,7 +104,7 @@ def inequalities(
     joints : enclosures of joints 0 .. N
     closing : how rows at the last joint read at the first one
     touch : the inequality that does not hold strictly, of an orbit at an event
-    loose : inequalities at joints that are known to hold, of the others that are returned
+    loose : inequalities at joints and rates at starts that are known to hold, of the others that are returned
     only : segments whose inside is looked at; all if it is not given
     """
     model, segments = chain.model, chain.segments
@@ -147,7 +149,8 @@ def inequalities(
                 finding = touched(path, row, order, None)
             else:
                 bends = InequalityName(i, surface, EXIT) in loose
-                finding = positive(path, row, order, ends, bends)
+                rises = order == 1 and InequalityName(i, surface, RATE) in loose
+                finding = positive(path, row, order, ends, bends, rises)
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros, touch)

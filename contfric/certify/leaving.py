@@ -9,7 +9,12 @@ a window W only, and its derivative by s for fixed tau is known in the same way.
 derivatives are negative over the whole box, towards its outer end, each of the inequalities holds for s
 below some number, so that all of them hold up to the least, s*: there the branch ends, and nowhere else in
 the box. The other inequalities are proved for all s; where they lean on one of the first (a load that
-begins at its limit at the event is below it before) they hold up to s*.
+begins at its limit at the event is below it before) they hold up to s*. Where a slide is left with an
+acceleration that vanishes at s* (at S = S0), that is one of the numbers, and the next derivative has a sign.
+
+A branch that ends at a limit of its parameter ends so, too, where an inequality vanishes there (at S = 0 the
+load at a stop, say). No event says that s* is the end. So its last box shows, too, that the orbits up to
+almost the end are admissible; or all of its orbits are, and the limit is one of the model only.
 """
 
 from __future__ import annotations
@@ -28,6 +33,7 @@ from contfric.certify.inequalities import (
     EXIT,
     INSIDE,
     JOINT,
+    RATE,
     Inequality,
     InequalityName,
     inequalities,
@@ -158,14 +164,37 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
     box = box_between(segments, build, *((inner, outer) if forward else (outer, inner)))
     if box is None:
         return None
-    names = ends_inside(Edge(tracer.system, segments, build, tracer.closes, forward), box)
-    if not names:
+    edge = Edge(tracer.system, segments, build, tracer.closes, forward)
+    names = ends_inside(edge, box)
+    if tracer.is_limit(-1 if forward else 0):
+        near = names and _is_near(edge, tracer, box, end, arcs[1] - arcs[0])
+        if not near and _failing(edge, box.all, ()):
+            return None
+    elif not names:
         return None
     tangential = any(name.what == EXIT and tracer.is_tangential(name.segment) for name in names)
-    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), forward, tangential)
+    leaves = forward if names else None
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), leaves, tangential)
     if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)
+
+
+def _is_near(edge: Edge, tracer: Tracer, box: Box, end: Vector, length: float) -> bool:
+    """Tell whether the orbit of a box up to which all are admissible is as near to an end as events are.
+
+    Parameters
+    ----------
+    length : from the inner end of the box to that end, in arclength
+    """
+    if not length > tracer.end:
+        return False
+    inner = box.first if edge.forward else box.last
+    plane = [(b - a).mid() for a, b in zip(inner, end, strict=True)]
+    inside = [(b - tracer.end / length * c).mid() for b, c in zip(end, plane, strict=True)]
+    point = solved(edge.segments, edge.build, tracer.plain, inside, plane)
+    zero = None if point is None else orbit_in(edge.segments, edge.build, point, plane)
+    return zero is not None and box.holds(zero) and not _failing(edge, zero, ())
 
 
 def join(
@@ -220,6 +249,11 @@ def ends_inside(edge: Edge, box: Box) -> tuple[InequalityName, ...]:
         return ()
     loose = [found.name for found in _failing(edge, box.all, ()) if found.name.what in _NUMBERS]
     left = _failing(edge, box.all, loose)
+    rates = [found.name._replace(what=RATE) for found in left if found.what == INSIDE]
+    if rates:
+        still = {found.name for found in _failing(edge, box.all, [*loose, *rates])}
+        loose += [name for name in rates if name._replace(what=INSIDE) not in still]
+        left = [found for found in left if found.name in still]
     if not all(found.name.what == INSIDE for found in left):
         return ()
     sides = (False, True) if edge.forward else (True, False)
@@ -262,9 +296,11 @@ def _falls(edge: Edge, box: Box, name: InequalityName, window: arb | None) -> bo
     else:
         if sign is None:
             return False
-        order = int(name.what == EXIT)
+        if name.what == RATE and edge.segments.resets[i]:
+            return False
+        order, at = int(name.what in (EXIT, RATE)), i + int(name.what != RATE)
         rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
-        slope = sign * dot(chain.observed(z, i + 1, *rows)[1], box.tangent)
+        slope = sign * dot(chain.observed(z, at, *rows)[1], box.tangent)
     return bool(slope < 0 if edge.forward else slope > 0)
 
 

@@ -211,7 +211,7 @@ def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, li
     times = _repeats(itinerary, joints, whole)
     if times > 1:
         count, periods = len(kept) // times, whole.periods // times
-        itinerary, joints = itinerary[:count], joints[:count]
+        itinerary, joints = itinerary[:count], _dated(whole, joints[:count], whole.period / times)
         tests = tuple(
             replace(t, segment=kept[kept.index(t.segment) % count])
             for t in tests
@@ -221,7 +221,7 @@ def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, li
         whole, kept = replace(whole, system=short, joints=joints), kept[:count]
     half = half_of(model, itinerary, whole.periods)
     if half is not None and _is_symmetric(model, joints, whole.period):
-        itinerary, joints = half, joints[: len(half)]
+        itinerary, joints = half, _dated(whole, joints[: len(half)], whole.period / 2)
     else:
         half = None
     try:
@@ -239,8 +239,16 @@ def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, li
         moved = EventFunction(test.margin, at, surface)
         if moved not in found:
             found.append(moved)
-    least = replace(whole, system=system, joints=joints.copy())
+    least = replace(whole, system=system, joints=joints)
     return least, [test for test in found if not _is_kept(least, test, found)]
+
+
+def _dated(orbit: Orbit, joints: FloatArray, turn: float) -> FloatArray:
+    """Return the joints of a turn at the times of its problem: without excitation it ends at time 0."""
+    joints = joints.copy()
+    if orbit.model.autonomous:
+        joints[:, 0] -= joints[0, 0] + turn
+    return joints
 
 
 def _lasting(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from flint import arb, arb_mat
 
@@ -130,14 +131,18 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     closing = closing_of(segments, model, half)
     still = condition.segment if condition is not None and condition.before else -1
     known = zeros_at_joints(segments, model, closing, met, still)
-    modes, resets = list(segments.modes), list(segments.resets)
+    whole = segments_of(orbit.as_whole().system)
+    starts = range(0, whole.count, segments.count)  # of the turn, or of its half and the image
+    modes = [list(whole.modes[k : k + segments.count]) for k in starts]
+    resets = [list(whole.resets[k : k + segments.count]) for k in starts]
     if still >= 0:  # both of its ends are one point
-        for values in (joints, known, modes, resets):
-            del values[still]
+        del joints[still], known[still]
+        for own in (*modes, *resets):
+            del own[still]
     if touched and condition is not None:
-        i, chain = condition.segment, Chain(segments, model)
-        after, mode = proof.zero[-2] * scale, modes[i]
-        move = chain.move(i, [*joints, *joints[:1]])
+        i = condition.segment
+        after, mode = proof.zero[-2] * scale, segments.modes[i]
+        move = Chain(segments, model).move(i, [*joints, *joints[:1]])
         end = numbers((move.field * after).exp() * move.start)
         kept = at_start(segments, model, i, known[i])
         kept = [row for row in kept if in_span(numbers(arb_mat([row]) * move.field), [])]
@@ -149,8 +154,10 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
         if condition.departs:
             rate = numbers(arb_mat([row]) * move.field)
         known.insert(i + 1, [row, rate, *kept])
-        modes.insert(i + 1, mode)
-        resets.insert(i + 1, "")
+        for own in modes:
+            own.insert(i + 1, own[i])
+        for own in resets:
+            own.insert(i + 1, "")
     turn = -joints[0][0] if autonomous else arb(segments.turn) * 2 * arb.pi()
     if half:
         image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
@@ -161,10 +168,9 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
                 *([closed(r, closing, segments, model) for r in rows] for rows in known),
             ],
         )
-        modes = [mode for mode, _ in orbit.itinerary]
-        resets = list(segments_of(orbit.as_whole().system).resets)
         turn = 2 * turn
-    return _Cycle(joints, modes, resets, known, turn, orbit.periods)
+    all_modes, all_resets = list(chain.from_iterable(modes)), list(chain.from_iterable(resets))
+    return _Cycle(joints, all_modes, all_resets, known, turn, orbit.periods)
 
 
 def _matched(cycle: _Cycle, joint: Vector) -> tuple[int, int] | None:

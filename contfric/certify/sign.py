@@ -187,7 +187,12 @@ def range_over(path: Path, derivatives: Derivatives, level: int, index: int) -> 
 
 
 def positive(
-    path: Path, row: arb_mat, start_order: int, end_order: int, bends: bool = False
+    path: Path,
+    row: arb_mat,
+    start_order: int,
+    end_order: int,
+    bends: bool = False,
+    rises: bool = False,
 ) -> Finding:
     """Find whether an observable is positive inside of a segment.
 
@@ -197,8 +202,10 @@ def positive(
     start_order : how many of q, q', q'' vanish at the start by construction; 0 if q does not
     end_order : the same at the end
     bends : whether q falls at the end, too, if only a little: so it does before where q'' is positive
+    rises : whether the first derivative that may differ from 0 at the start is not negative: so q is positive
+        where the next one is
     """
-    shown = _shown(path, row, start_order, end_order, bends)
+    shown = _shown(path, row, start_order, end_order, bends, rises)
     level = 0
     while (path.norm * path.duration).upper() > 2**level and 2**level < _MOST:
         level += 1
@@ -221,7 +228,12 @@ def positive(
 
 
 def _shown(
-    path: Path, row: arb_mat, start_order: int, end_order: int, bends: bool
+    path: Path,
+    row: arb_mat,
+    start_order: int,
+    end_order: int,
+    bends: bool = False,
+    rises: bool = False,
 ) -> Callable[[int, int], bool | None]:
     """Return what tells whether an observable is positive on a piece; None if that is not decided."""
     rows = path.derivatives(row)
@@ -229,6 +241,7 @@ def _shown(
     sign = (-1) ** end_order  # of the derivatives by the time that is left
     last = path.derivatives(higher(path, row, end_order) * sign) if end_order else rows
     bend = path.derivatives(higher(path, row, 2)) if bends else rows
+    rise = path.derivatives(higher(path, row, start_order + 1)) if rises else rows
 
     def shown(level: int, index: int) -> bool | None:
         value = range_over(path, rows, level, index)
@@ -238,6 +251,8 @@ def _shown(
         if value > 0:
             return True
         if at_start and range_over(path, first, level, index) > 0:
+            return True
+        if at_start and rises and range_over(path, rise, level, index) > 0:
             return True
         if at_end and range_over(path, last, level, index) > 0:
             return True
@@ -252,7 +267,7 @@ def undecided(path: Path, row: arb_mat, start_order: int, end_order: int) -> arb
 
     None if it may not be positive next to an end of the segment.
     """
-    shown, waiting, level = _shown(path, row, start_order, end_order, False), [0], 0
+    shown, waiting, level = _shown(path, row, start_order, end_order), [0], 0
     for level in range(_WINDOW + 1):
         found = [k for k in waiting if not shown(level, k)]
         waiting = [half for k in found for half in (2 * k, 2 * k + 1)]

@@ -26,7 +26,7 @@ from contfric.certify.kept import with_kept
 from contfric.certify.meeting import as_zero_of
 from contfric.certify.zeros import in_span
 from contfric.continuation.branch import Branch
-from contfric.events.bifurcation import TERMINAL
+from contfric.events.bifurcation import TERMINAL, EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector
@@ -34,6 +34,8 @@ from contfric.orbit.orbit import Orbit
 
 #: Shortest step that is halved, as a share of the branch; events at its ends are as near to them and nearer.
 _SHORTEST, _AT_END = 1e-5, 1e-8
+#: Points nearer than this to a limit of the parameter are no ends of boxes, as a share of the branch.
+_NEAR = 1e-4
 #: How far the box of a PD or BP may reach, as a share of the branch.
 _FAR = 0.1
 
@@ -122,7 +124,7 @@ class Strand:
             return {}
         found = {}
         for k, point in enumerate(points):
-            if not point.enclosure or point.orbit.system is not self.branch[k].system:
+            if not point.enclosure or point.orbit.system.half != self.branch.system.half:
                 continue
             value, m = arb(float(self.branch.values[k])), self.segments.states + 1
             period = self._model(value).period
@@ -167,9 +169,23 @@ class Strand:
         at_end = (k == 0 and self.has_edge(0)) or (k + 2 == len(arc) and self.has_edge(-1))
         return bool(arc[0] < arc[-1] and arc[k] == arc[k + 1]) and not at_end
 
+    def is_limit(self, end: int) -> bool:
+        """Tell whether the branch ends at a limit of its parameter."""
+        return self.branch.ends[end].reason is EndReason.LIMIT
+
+    def after(self, k: int) -> int:
+        """Return the next point, or the one after those that are very near to a limit of the parameter."""
+        arc = self.branch.arc
+        near, last = _NEAR * float(arc[-1] - arc[0]), len(arc) - 1
+        if k == 0 and self.is_limit(0):
+            return next((j for j in range(1, last) if arc[j] - arc[0] > near), last)
+        return last if self.is_limit(-1) and arc[-1] - arc[k + 1] < near else k + 1
+
     def has_edge(self, end: int) -> bool:
-        """Tell whether the branch ends at an event of its inequalities."""
+        """Tell whether the branch ends at an event of its inequalities, or at a limit of its parameter."""
         if self.branch.ends[end].reason.name in [kind.value for kind in TERMINAL]:
+            return True
+        if self.is_limit(end):
             return True
         at = float(self.branch.arc[end])
         return any(

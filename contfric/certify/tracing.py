@@ -134,7 +134,7 @@ class Tracer(Strand):
 
     def _reached(self, k: int, stop: int) -> int:
         """Return the last point up to which a box is tried from point k: one step, or more."""
-        arc, found = self.branch.arc, k + 1
+        arc, found = self.branch.arc, min(self.after(k), stop)
         grows = _GROWTH if self.steady >= self.patience else _SAME
         most = grows * min(self.length, self.proved_length)
         while found < stop and not (self._is_special(k) or self._is_special(found)):
@@ -149,7 +149,7 @@ class Tracer(Strand):
         ends = ((0, k == 0), (-1, k + 2 == count))
         if k + 1 >= count or any(there and self.has_edge(end) for end, there in ends):
             return True
-        return any(
+        return self.after(k) > k + 1 or any(
             flip is not None and abs(at[k + 1 - end] - at[-end]) < self.far
             for end, flip in enumerate(self.flips)
         )

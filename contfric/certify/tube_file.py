@@ -43,8 +43,9 @@ _REACH = 2.5
 #: Share of a branch that is left out next to the BP or PD where it is born: boxes shrink in proportion to the
 #: distance from there.
 _BORN = 0.02
-#: Up to which share of the box of an end that the checker does not know a tube is written: before the event.
-_BEFORE = 0.8
+#: Up to which share of the box of an end that the checker does not know a tube is written: before the event,
+#: or before a limit of the parameter (which lies at 0.91).
+_BEFORE, _BEFORE_LIMIT = 0.8, 0.9
 #: What is in a file and not looked at, for a reader of it.
 _UNCHECKED = "what lies between an open end (null) and the event at which the branch ends"
 
@@ -267,7 +268,8 @@ def _from_end(
     """Return the tube from an end of the branch before a knot to another knot, if one is decided."""
     ends = _ends(proof, proof.pieces[0])
     if not ends:
-        run = _GrowingTube(_data(proof), _between(row, before, _BEFORE), until)
+        share = _before(proof.pieces[0])
+        run = _GrowingTube(_data(proof), _between(row, before, share), until)
         return run if run.march(row) else None
     for end in ends:
         run = _GrowingTube(_data(proof), row, until)
@@ -286,11 +288,15 @@ def _on(proof: BranchCertificate, k: int, run: _GrowingTube, row: _Row, further:
     elif k == len(proof.pieces) - 1:
         ends = _ends(proof, piece)
         if not ends:
-            run.march(_between(run.rows[-1], row, _BEFORE))
+            run.march(_between(run.rows[-1], row, _before(piece)))
         for end in ends:
             if run.finish(row, end):
                 run.ends[1] = end
                 break
+
+
+def _before(piece: Piece) -> float:
+    return _BEFORE if piece.events else _BEFORE_LIMIT
 
 
 def _ends(proof: BranchCertificate, piece: Piece) -> list[list[Any]]:

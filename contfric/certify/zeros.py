@@ -129,8 +129,11 @@ def in_span(row: Vector, rows: list[Vector]) -> bool:
     """
     if any(row is other for other in rows):  # of balls that are not exact, too
         return True
-    # balls that are not exact leave nothing exactly zero: rows of them come last
-    basis = sorted(rows, key=lambda other: all(x.is_exact() for x in other))
+    # balls that are not exact leave nothing exactly zero: rows of them come last; and rows of few entries
+    # first, as those of surfaces such as x = 0, since quotients of others are rounded
+    basis = sorted(
+        rows, key=lambda own: (all(x.is_exact() for x in own), sum(map(arb.is_zero, own)))
+    )
     left = row
     while basis and not _is_zero(left):
         pivot = basis.pop()

@@ -16,7 +16,9 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
-from contfric.certify import events, files
+from contfric.certify import branch as branches
+from contfric.certify import diagram as diagrams
+from contfric.certify import events, files, tracing
 from contfric.certify import limit as time_limit
 from contfric.certify.diagram_certificate import (
     DiagramCertificate,
@@ -110,6 +112,32 @@ def test_a_time_limit_is_named() -> None:
         diagram().certify(time_limit=-1)
 
 
+def test_before_the_first_tube_all_printed_orbits_are_proved(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The time is over as soon as a tube is begun: they are cheap, those of later branches, too."""
+    wanted, over = proved().branches, False
+
+    def clock() -> float:
+        return 10.0 if over else 0.0
+
+    cover = branches.cover
+
+    def late(*args: Any) -> list[Any]:
+        nonlocal over
+        over = True
+        return cover(*args)
+
+    for module in (time_limit, branches, tracing, diagrams):
+        monkeypatch.setattr(module, "time", SimpleNamespace(time=clock))
+    monkeypatch.setattr(branches, "cover", late)
+    found = diagram().certify(time_limit=5.0)
+    assert over and found.covered == 0.0 and len(found.branches) > 1
+    for one, whole in zip(found.branches, wanted, strict=True):
+        assert one.points == whole.points
+        assert one.points_proved >= whole.points_proved - 1  # one next to the fold needs the tube
+
+
 def test_an_event_ends_at_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever it comes: no orbit is evaluated after it, and no inequality."""
     event = next(b for b in diagram().bifurcations if b.kind is cf.Kind.SN)
@@ -137,7 +165,7 @@ def test_an_event_ends_at_the_time_limit(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_progress_and_executor(kind: type[Executor]) -> None:
     said: list[str] = []
     with kind(2) as pool:  # type: ignore[call-arg] # both take a number of workers
-        found = diagram().certify(executor=pool, progress=said.append)
+        found = diagram().certify(executor=pool, time_limit=600.0, progress=said.append)
     assert said and not [text for text in said if "lost" in text]
     assert found.branches == proved().branches
     assert found.events == proved().events

@@ -317,6 +317,16 @@ def test_stability_is_decided_by_discs(size: str, verdict: str) -> None:
     assert stability(discs).verdict == verdict
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_in_span_of_a_surface_and_its_rate(seed: int) -> None:
+    """Whatever is off by multiples of x and x', in whichever order they are known."""
+    a, b, c = (arb(float(x)) for x in np.random.default_rng(seed).normal(size=3))
+    surface, rate = [arb(1), arb(0), arb(0), arb(0)], [a, arb(1), arb(0), b]
+    for rows in ([surface, rate], [rate, surface]):
+        assert in_span([c, arb(-2), arb(0), -2 * b], rows)
+        assert not in_span([c, arb(-2), arb(0), -2 * b + arb(2) ** -40], rows)
+
+
 def test_in_span_is_exact() -> None:
     one, two = [arb(1), arb(2), arb(0)], [arb(0), arb(1), arb(1)]
     assert in_span([arb(2), arb(5), arb(1)], [one, two])

@@ -12,13 +12,17 @@ import pytest
 from flint import arb, ctx
 
 import contfric as cf
-from contfric.certify import tracing
+from contfric.base.arrays import FloatArray
+from contfric.bvp.margins import EventFunction, Margin
+from contfric.bvp.system import build_system
+from contfric.certify import locating, tracing
 from contfric.certify.branch import certify_branch, cover
 from contfric.certify.chain import Chain, segments_of
+from contfric.certify.inequalities import RATE
 from contfric.certify.strand import Strand, in_phases
 from contfric.certify.tracing import Tracer
 from contfric.certify.tube import Box, box_between, solved
-from contfric.events.bifurcation import EndReason
+from contfric.events.bifurcation import End, EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working
@@ -156,29 +160,73 @@ def test_what_lies_elsewhere_is_not_in_a_box() -> None:
         assert not holding.holds([2 * b - a for a, b in zip(first, last, strict=True)])
 
 
-def test_a_branch_beyond_its_end_is_not_proved() -> None:
-    """The equations are solved below the CS, where the stops should have stuck."""
+def solved_at(values: FloatArray) -> cf.Branch:
+    """Return solutions of the equations of the branch without sticks, admissible or not."""
     branch = den_hartog()
-    values = np.linspace(0.5345, 0.5350, 6)
     orbit, joints = branch[int(np.argmin(branch.values))], []
-    for value in values[::-1]:
+    for value in values:
         vector = branch.vector.copy()
         vector[0] = value
         orbit = refine(replace(orbit, vector=vector))
         assert orbit.converged
         joints.append(orbit.joints)
-    beyond = replace(
+    return replace(
         branch,
-        values=values[::-1],
+        values=values,
         joints=np.array(joints),
-        arc=np.linspace(0.0, 1.0, 6),
-        labels=branch.labels[:6],
+        arc=np.linspace(0.0, 1.0, len(values)),
+        labels=branch.labels[: len(values)],
     )
-    certificate = certify_branch(beyond)
+
+
+def test_a_branch_beyond_its_end_is_not_proved() -> None:
+    """The equations are solved below the CS, where the stops should have stuck."""
+    certificate = certify_branch(solved_at(np.linspace(0.5350, 0.5345, 6)))
     assert certificate.covered == 0.0
     assert not certificate.proved
     assert all(piece.exists for piece in certificate.pieces)  # the curve is there
     assert all("joint at F" in gap for gap in certificate.gaps)
+
+
+def test_a_limit_of_the_parameter_is_no_end_that_inequalities_reach_before_it() -> None:
+    """The stops should stick below the CS at 0.53529: a branch that says it ends at 0.5350 is not proved."""
+    branch = solved_at(np.linspace(0.5375, 0.5350, 4))
+    ends = (End(EndReason.RANGE), End(EndReason.LIMIT))
+    certificate = certify_branch(replace(branch, ends=ends, bifurcations=()))
+    proved = [piece.values[1] for piece in certificate.pieces if piece.proved]
+    assert proved and min(proved) > 0.53529246
+    assert not certificate.complete and certificate.covered < 0.9
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_branches_up_to_the_limits_of_friction(seed: int) -> None:
+    """With S0 = S a stick is released with acceleration 0; with S = 0 a stop may be at its limit."""
+    rng = np.random.default_rng(seed)
+    scene = {
+        "Omega": rng.uniform(0.45, 0.6),
+        "h": rng.uniform(-0.05, 0.05),
+        "S0": rng.uniform(0.4, 0.6),
+    }
+    limit = scene["S0"]
+    orbit = cf.find_orbit("coulomb", scene | {"S": 0.9 * limit})
+    branch = cf.continue_orbit(orbit, "S", (0.88 * limit, 1.0))
+    assert branch.ends[-1].reason is EndReason.LIMIT
+    certificate = branch.certify()
+    assert certificate.complete, (certificate.gaps, certificate.open)
+    released = {k for k, (mode, _) in enumerate(branch.system.itinerary) if mode == "stick"}
+    after = {(k + 1) % len(branch.system.itinerary) for k in released}
+    assert {(name.segment, name.what) for name in certificate.pieces[-1].ends} == {
+        (k, RATE) for k in after
+    }
+
+
+def test_a_branch_without_damping_up_to_no_friction() -> None:
+    """At Omega = 1/2, where all slides of S = 0 come back to where they began."""
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.1, "S0": 0.4})
+    certificate = cf.continue_orbit(orbit, "S", (-1.0, 0.11)).certify()
+    assert certificate.branch.ends[0].reason is EndReason.LIMIT
+    assert certificate.complete, (certificate.gaps, certificate.open)
+    assert [name.what for name in certificate.pieces[0].ends] == ["joint"]
 
 
 @functools.cache
@@ -454,3 +502,38 @@ def test_events_of_branches_without_excitation_solve_their_equations() -> None:
             assert all(x.contains(0) and x.rad() < 1e-25 for x in chain.residual(zero[:-1]))
             off = [float(x) - y for x, y in zip(zero, fold.orbit.joints.ravel(), strict=False)]
             assert np.abs(off).max() < 1e-6
+
+
+@pytest.mark.parametrize("turns", [1, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_the_shortest_problem_of_a_cycle_without_excitation(seed: int, turns: int) -> None:
+    """Its turn ends at time 0, whether it is half of a symmetric orbit or one of several turns."""
+    rng = np.random.default_rng(seed)
+    orbit = cf.find_orbit("relay-sliding", {"lam": rng.uniform(0.054, 0.08)}).as_whole()
+    model, period, cycle = orbit.model, orbit.period, orbit.cycle
+    joints = np.concatenate([cycle - [k * period, 0, 0, 0] for k in range(turns)][::-1])
+    system = build_system(model, orbit.itinerary * turns, turns)
+    last = len(joints) - 1  # of several turns one inequality is looked at in each
+    tests = tuple(
+        EventFunction(Margin.INTERIOR, k, "switch") for k in range(last % len(cycle), last + 1, 4)
+    )
+    whole = replace(orbit, system=system, joints=joints)
+    short, _ = locating._shortest(whole, tests)
+    assert short.system.half and len(short.joints) == len(cycle) // 2
+    chain = Chain(segments_of(short.system), ball_model(model, short.params))
+    off = chain.residual([arb(float(c)) for c in short.joints.ravel()])
+    assert max(abs(float(c)) for c in off) < 1e-9
+
+
+def test_touches_of_symmetric_cycles_without_excitation_are_proved() -> None:
+    """Of relay feedback with sliding: a slide that touches its limit, and an arc that touches the switch."""
+    diagram = cf.explore(cf.find_orbit("relay-sliding"), "lam", (0.049, 0.0556), max_branches=3)
+    proofs = {event.label: event.certify("lam") for event in diagram.bifurcations}
+    assert {"AS_s", "GS_s"} <= set(proofs)
+    for label in ("AS_s", "GS_s"):
+        assert proofs[label].proved, proofs[label].why
+        assert proofs[label].radius < 1e-25 and proofs[label].error < 1e-10
+    for name, events in (("2s, 26seg", {"AS_s", "GS_s"}), ("4s, 28seg", {"GS_s"})):
+        (branch,) = [branch for branch in diagram.branches if branch.name == name]
+        certificate = branch.certify()
+        assert certificate.complete and set(certificate.events) == events
