@@ -15,7 +15,7 @@ from contfric.base.resources import bundled_dir
 from contfric.cli import main
 from contfric.models.check import ModelReport, Severity, Topic, check_model
 from contfric.models.check.hidden import check_hidden, hidden_symmetry
-from contfric.models.check.probe import Probe
+from contfric.models.check.probe import Probe, _shortest
 
 GOOD = """\
 name: checked
@@ -452,3 +452,25 @@ def test_an_end_of_derived_sliding_that_no_state_has_is_no_warning(tmp_path: Pat
     said = str(check_model(cf.load_model(path)))
     assert "no state was found on surface 'far'" in said
     assert "surface 'slide" not in said
+
+
+def test_places_on_surfaces_are_the_nearest_ones() -> None:
+    """Of one surface without a decomposition: a gradient may vanish, be tiny, or huge."""
+    rng = np.random.default_rng(3)
+    for size in (0.0, 1e-200, 1e-9, 1.0, 1e200):
+        for rows in (1, 2):
+            slopes, heights = size * rng.normal(size=(rows, 4)), size * rng.normal(size=rows)
+            exact, _, rank, _ = np.linalg.lstsq(slopes, heights, rcond=None)
+            step, found = _shortest(slopes, heights)
+            assert found == rank
+            assert step == pytest.approx(exact, rel=1e-12, abs=1e-14)
+
+
+def test_surfaces_that_do_not_meet_have_no_place() -> None:
+    model = cf.load_model("dead-band")
+    probe = Probe(model, {})
+    low, high, *_ = (s.name for s in model.surfaces if s.observable == model.surfaces[0].observable)
+    for t, y in probe.states(20):
+        assert probe.landed((low,), t, y) is not None
+        assert probe.landed((high,), t, y) is not None
+        assert probe.landed((low, high), t, y) is None

@@ -118,7 +118,11 @@ def _shift(
             slopes[:, column] = (missing(k + step) - missing(k - step)) / (2.0 * _DIFFERENCE)
         if not np.all(np.isfinite(slopes)):
             return None
-        k[free] -= np.linalg.lstsq(slopes, here, rcond=1e-9)[0]
+        towards = np.linalg.lstsq(slopes, here, rcond=1e-9)[0]
+        left = np.max(np.abs(here - slopes @ towards)) > 0.5 * np.max(np.abs(here))
+        if left and not converged and np.max(np.abs(towards)) <= _SAME * (1.0 + np.max(np.abs(k))):
+            return None  # the nearest that a shift comes
+        k[free] -= towards
     return None
 
 
