@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.jumps import leaves_smoothly, leaving_rate, nothing_jumps
+from contfric.events.jumps import leaving_rate, nothing_jumps
+from contfric.events.touching import is_rate_of
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest
 from contfric.simulation.starts import signs_at
@@ -17,6 +21,31 @@ NO_JUMP = 1e-9
 
 class NoJump(NotationError):
     """Nothing can be held at an event: the solution there is continuous."""
+
+
+def leaves_smoothly(orbit: Orbit, rest: str, departs: str) -> bool:
+    """Tell whether a rest is left to a mode without acceleration, at the parameters of an orbit."""
+    return left_at_rest(orbit.model, rest, departs) or nothing_jumps(orbit)
+
+
+@cache
+def left_at_rest(model: Model, rest: str, departs: str) -> bool:
+    """Tell whether rest is left to a mode without acceleration: the solution does not jump where it begins.
+
+    So it is everywhere in some models. In others there are contacts that jump, and Jenkins elements that do
+    not: the stretch of one that slips rests at its limit until its rate, the velocity, vanishes.
+    """
+    if model.filippov:
+        return True
+    leaves = [
+        is_rate_of(model, model.domain_by_name[target].mode, on, back)
+        for domain in model.domains_of(rest)
+        for on in (name for name, side in domain.signs.items() if side == 0)
+        if not model.lies_on(departs, on)
+        for back, target in model.exits_of(domain.name)
+        if not model.lies_on(model.domain_by_name[target].mode, on)
+    ]
+    return bool(leaves) and all(leaves)
 
 
 def check_held(orbit: Orbit, rest: str, departs: str | None, joint: FloatArray) -> None:

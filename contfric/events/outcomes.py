@@ -44,8 +44,14 @@ from contfric.errors import NotationError
 from contfric.events import standing_slides as slides
 from contfric.events.bifurcation import Kind
 from contfric.events.contact_outcomes import continuous_edit
-from contfric.events.holdable import NoJump, check_held, check_inside, rest_mode, vanishes_with
-from contfric.events.jumps import leaves_smoothly
+from contfric.events.holdable import (
+    NoJump,
+    check_held,
+    check_inside,
+    leaves_smoothly,
+    rest_mode,
+    vanishes_with,
+)
 from contfric.events.touching import chosen_at, crossed_at, entered_at, thrown_at
 from contfric.events.zero_acceleration import (
     first_zero_acceleration,

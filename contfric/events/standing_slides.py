@@ -16,8 +16,8 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
 from contfric.events.contact_outcomes import Joints, Speeds
-from contfric.events.holdable import NO_JUMP, NoJump
-from contfric.events.jumps import leaves_smoothly, nothing_jumps
+from contfric.events.holdable import NO_JUMP, NoJump, leaves_smoothly
+from contfric.events.jumps import nothing_jumps
 from contfric.events.touching import rate_along, rate_scale
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.slides import time_unit
