@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.accuracy import not_critical
-from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves, passes_point
+from contfric.continuation.accuracy.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
+from contfric.continuation.accuracy.rounding import not_critical
+from contfric.continuation.ends.at_events import (
+    end_at_limit,
+    ends_at,
+    is_point,
+    never_leaves,
+    passes_point,
+)
+from contfric.continuation.ends.at_range import ends_at_limit, is_at_limit, limit_crossed, limit_end
+from contfric.continuation.ends.at_values import stop_between
+from contfric.continuation.ends.at_vertices import NEAREST, SHORTER
 from contfric.continuation.half_branch import Side
+from contfric.continuation.locating.sliding import nearly_reached, sliding_events
+from contfric.continuation.locating.smooth import SAME_TANGENCY, smooth_events
 from contfric.continuation.moving_joints import (
     LAST_CROSSING,
     is_known_touch,
     is_on_section,
     move_joints,
 )
-from contfric.continuation.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.continuation.range_ends import ends_at_limit, is_at_limit, limit_crossed, limit_end
-from contfric.continuation.sliding import nearly_reached, sliding_events
-from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
-from contfric.continuation.stopping import stop_between
-from contfric.continuation.vertex_ends import NEAREST, SHORTER
 from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.orbit.orbit import Orbit
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.bvp.system import EventFunction
-from contfric.continuation.accuracy import Estimate
+from contfric.continuation.accuracy.rounding import Estimate
 from contfric.continuation.points import Point, Settings
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.events.sliding_kinds import load_stands_still

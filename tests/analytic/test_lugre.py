@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 import contfric as cf
 from contfric.bvp.system import build_system
 from contfric.continuation.half_branch import first_point
+from contfric.continuation.locating.smooth import smooth_events
 from contfric.continuation.points import settings_of
-from contfric.continuation.smooth import smooth_events
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

@@ -12,12 +12,12 @@ import pytest
 from flint import arb, ctx
 
 import contfric as cf
-from contfric.certify import tracing
 from contfric.certify.branch import certify_branch, cover
-from contfric.certify.chain import Chain, segments_of
-from contfric.certify.strand import Strand, in_phases
-from contfric.certify.tracing import Tracer
-from contfric.certify.tube import Box, box_between, solved
+from contfric.certify.equations.chain import Chain, segments_of
+from contfric.certify.tubes import tracing
+from contfric.certify.tubes.strand import Strand, in_phases
+from contfric.certify.tubes.tracing import Tracer
+from contfric.certify.tubes.tube import Box, box_between, solved
 from contfric.events.bifurcation import EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel

@@ -15,14 +15,19 @@ from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
 from contfric.base.tally import tally
 from contfric.bvp.system import Margin
-from contfric.continuation import smooth
-from contfric.continuation.folds import _is_idle
+from contfric.continuation.ends.at_vertices import left_at
 from contfric.continuation.half_branch import first_point
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import Point, settings_of
-from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
+from contfric.continuation.singular_points.folds import _is_idle
+from contfric.continuation.singular_points.switching import (
+    LEAVE,
+    leave_along,
+    null_direction,
+    overshoots,
+)
+from contfric.continuation.singular_points.vertices import passed_vertex
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertex_ends import left_at
-from contfric.continuation.vertices import passed_vertex
 from contfric.events import sliding_kinds as kinds
 from contfric.events.doubling_point import moved, opening, refined_opening
 from contfric.simulation.simulate import tables

@@ -14,7 +14,7 @@ import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation import events_of_step as resolve
-from contfric.continuation import smooth
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import LARGEST_STEP
 from contfric.events.bifurcation import Kind
 

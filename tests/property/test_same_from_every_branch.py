@@ -10,10 +10,10 @@ import pytest
 import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
-from contfric.continuation import smooth
-from contfric.continuation.folds import fold_at
 from contfric.continuation.half_branch import point_before
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import LARGEST_STEP
+from contfric.continuation.singular_points.folds import fold_at
 from contfric.events.bifurcation import Kind
 from contfric.events.incident import Name, kinds_between
 
@@ -55,7 +55,9 @@ def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
             assert [event.kind for event, _ in found] == [Kind.SN]
         # a parameter that goes on in the same direction does not turn
         rising = altered(after, w=2.0 * point.w - after.w)
-        monkeypatch.setattr("contfric.continuation.folds._farther", lambda _o, _p, sides, _s: sides)
+        monkeypatch.setattr(
+            "contfric.continuation.singular_points.folds._farther", lambda _o, _p, sides, _s: sides
+        )
         assert not fold_at(orbit, before, rising, rising, point, settings)
         monkeypatch.undo()
 
