@@ -26,6 +26,7 @@ from contfric.continuation.moving_joints import (
     move_joints,
 )
 from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.step import Step
 from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.orbit.orbit import Orbit
 
@@ -180,14 +181,14 @@ def locate_events(
     """
     sliding = sliding_events(orbit, before, after, settings)
     if not sliding:
-        smooth = smooth_events(orbit, before, after, settings, after)
+        smooth = smooth_events(Step(orbit, before, after, after, settings))
         return sorted(smooth, key=lambda pair: pair[1].arc)
     end = sliding[0][1]
     if end.arc <= before.arc:  # it is at the first point: nothing comes before it
         return sliding
     smooth = [
         (b, point)
-        for b, point in smooth_events(orbit, before, after, settings, end)
+        for b, point in smooth_events(Step(orbit, before, after, end, settings))
         if point.arc < end.arc and not belongs_to(b, point, end, settings)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -29,10 +30,10 @@ def _slow_fold(monkeypatch):
     """Return what a bridge that hardly turns is asked at its fold, with the located point."""
     asked = []
 
-    def located(orbit, before, after, beyond, point, settings):
-        if orbit.system.holds:
-            asked.append((orbit, point, settings))
-        return fold_at(orbit, before, after, beyond, point, settings)
+    def located(step, point):
+        if step.orbit.system.holds:
+            asked.append((step, point))
+        return fold_at(step, point)
 
     with monkeypatch.context() as patched:
         patched.setattr(smooth, "fold_at", located)
@@ -45,20 +46,22 @@ def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
     rng = np.random.default_rng(5)
     asked = _slow_fold(monkeypatch)
     assert asked
-    for orbit, point, settings in asked:
-        here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
+    for step, point in asked:
+        here = step.orbit_at(point)
         for _ in range(8):
             near, far = 10.0 ** rng.uniform(-7.0, -2.0), 10.0 ** rng.uniform(-4.0, -2.0)
             near, far = (near, far) if rng.random() < 0.5 else (far, near)
-            before, after = (point_before(here, point, back, settings) for back in (near, -far))
-            found = fold_at(orbit, before, after, after, point, settings)
+            before, after = (
+                point_before(here, point, back, step.settings) for back in (near, -far)
+            )
+            found = fold_at(replace(step, before=before, after=after, beyond=after), point)
             assert [event.kind for event, _ in found] == [Kind.SN]
         # a parameter that goes on in the same direction does not turn
         rising = altered(after, w=2.0 * point.w - after.w)
         monkeypatch.setattr(
             "contfric.continuation.singular_points.folds._farther", lambda _o, _p, sides, _s: sides
         )
-        assert not fold_at(orbit, before, rising, rising, point, settings)
+        assert not fold_at(replace(step, before=before, after=rising, beyond=rising), point)
         monkeypatch.undo()
 
 

@@ -23,8 +23,8 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.continuation.half_branch import first_point, point_before
-from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.orbit.orbit import Orbit
+from contfric.continuation.points import EXTRA, Point
+from contfric.continuation.step import Step
 
 #: Arclength within which a smooth event belongs to a sliding event: where a stop becomes tangential
 #: the branch folds and its multipliers are infinite, and where it meets a surface labels change.
@@ -45,62 +45,56 @@ _WITHIN = 0.9
 _MISS = 0.3
 
 
-def last_told(
-    orbit: Orbit, before: Point, after: Point, beyond: Point, settings: Settings
-) -> Point | None:
+def last_told(step: Step) -> Point | None:
     """Return the last point of a step at which the signs of slopes and multipliers are told, or None.
 
-    Parameters
-    ----------
-    before, after : the ends of the step
-    beyond : the sliding event within it; ``after`` where there is none
-
-    Notes
-    -----
     Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event it
     is infinite, or its sign is that of a rate that is rounding.
     """
-    here = beyond.orbit(orbit, orbit.model.index_of(settings.parameter))
-    if beyond is not after and bool(np.min(here.durations) < NO_LENGTH):
-        told = _told_before(orbit, before, beyond, settings)
+    beyond = step.beyond
+    here = step.orbit_at(beyond)
+    if beyond is not step.after and bool(np.min(here.durations) < NO_LENGTH):
+        told = _told_before(step)
         if told is not None:
             return told
     if not np.isfinite(beyond.tests[-EXTRA:]).all():
         return None
     if not np.abs(beyond.mu).max(initial=0.0) > _INFINITE:
         return beyond
-    return _if_finite(point_before(here, beyond, SAME_LOCATION, settings))
+    return _if_finite(point_before(here, beyond, SAME_LOCATION, step.settings))
 
 
-def first_told(orbit: Orbit, before: Point, after: Point, settings: Settings) -> Point:
+def first_told(step: Step) -> Point:
     """Return the first point of a step at which the signs of multipliers are told.
 
     At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
     """
+    before = step.before
     at_event = np.min(before.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION
     pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
-    if not pole or after.arc - before.arc <= 2.0 * SAME_LOCATION:
+    if not pole or step.length <= 2.0 * SAME_LOCATION:
         return before
-    return _if_finite(point_before(orbit, before, -SAME_LOCATION, settings)) or before
+    return _if_finite(point_before(step.orbit, before, -SAME_LOCATION, step.settings)) or before
 
 
 def _if_finite(point: Point | None) -> Point | None:
     return point if point is not None and np.isfinite(point.tests[-EXTRA:]).all() else None
 
 
-def _told_before(orbit: Orbit, before: Point, event: Point, settings: Settings) -> Point | None:
-    """Return the point before an event from which on all belongs to it; None where that is not told.
+def _told_before(step: Step) -> Point | None:
+    """Return the point before a sliding event from which on all belongs to it; None where that is not told.
 
     So it is where the parameter goes on through the event, as it does where no two curves cross.
     """
-    least, length = SAME_VALUE * settings.width, event.arc - before.arc
+    before, event = step.before, step.beyond
+    least, length = SAME_VALUE * step.settings.width, event.arc - before.arc
     if abs(event.value - before.value) <= least and length <= SAME_FOLD:
         return before
     # where two curves cross the parameter leaves the event with the square of the distance
     bend = abs(event.value - before.value - before.slope * length) / length**2
     back = min(SAME_FOLD, 0.5 * length, float(np.sqrt(least / bend)) if bend > 0.0 else np.inf)
     while back > SAME_LOCATION:
-        point = _point_at(orbit, before, event, _WITHIN * back, settings)
+        point = _point_at(step, _WITHIN * back)
         left = np.inf if point is None else abs(event.value - point.value)
         if left <= least:
             return point
@@ -108,14 +102,13 @@ def _told_before(orbit: Orbit, before: Point, event: Point, settings: Settings) 
     return None
 
 
-def _point_at(
-    orbit: Orbit, before: Point, event: Point, back: float, settings: Settings
-) -> Point | None:
-    """Solve for the point at a distance before an event; None if Newton goes astray.
+def _point_at(step: Step, back: float) -> Point | None:
+    """Solve for the point at a distance before the sliding event of a step; None if Newton goes astray.
 
     It is predicted by the parabola through both locations with the tangent at the first one: that at the
     event is rounding, or that of another curve.
     """
+    before, event = step.before, step.beyond
     length = event.arc - before.arc
     s = length - back
 
@@ -127,12 +120,12 @@ def _point_at(
 
     joints, tangent = along(before.joints, event.joints, before.tangent)
     w, direction = along(before.w, event.w, before.direction)
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = w[0]
-    predicted = altered(orbit, joints=joints, vector=vector)
-    point = _if_finite(first_point(predicted, settings, tangent, float(direction[0])))
+    vector = step.orbit.vector.copy()
+    vector[step.active] = w[0]
+    predicted = altered(step.orbit, joints=joints, vector=vector)
+    point = _if_finite(first_point(predicted, step.settings, tangent, float(direction[0])))
     if point is None:
         return None
     square = float(np.sum((point.joints - joints) ** 2)) / len(joints)
-    miss = np.sqrt(square + float((point.w - w) @ (point.w - w)) * settings.scale)
+    miss = np.sqrt(square + float((point.w - w) @ (point.w - w)) * step.settings.scale)
     return altered(point, arc=event.arc - back) if miss < _MISS * back else None

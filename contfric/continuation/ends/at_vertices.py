@@ -27,6 +27,7 @@ from contfric.continuation.singular_points.vertices import (
     symmetrised,
     undoubled,
 )
+from contfric.continuation.step import Step
 from contfric.events.bifurcation import Bifurcation, End, EndReason, Kind
 from contfric.events.doubling_point import moved, opening
 from contfric.orbit.orbit import Orbit
@@ -76,7 +77,7 @@ def overshoots_vertex(orbit: Orbit, side: Side, settings: Settings, written: int
         return Overshoot.NONE
     before, after = side.rows.point(passed[0]), side.rows.point(passed[0] + 1)
     if np.isfinite(passed[1]):
-        found = overshot_vertex(orbit, before, after, passed[1], settings)
+        found = overshot_vertex(Step(orbit, before, after, after, settings), passed[1])
     else:
         found = _gone_over(orbit, before, after, settings)
     if found is not None:
@@ -105,7 +106,7 @@ def _touches_before(
     near = point_before(here, vertex, _NEXT_TO, settings)
     if near is None or near.arc <= before.arc:
         return []
-    touches = tangencies(orbit, before, near, settings)
+    touches = tangencies(Step(orbit, before, near, near, settings))
     return [event for event, _ in sorted(touches, key=lambda located: located[1].arc)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,9 +19,9 @@ from contfric.continuation.accuracy.near_sliding_events import (
 )
 from contfric.continuation.families.continuum import LEVEL
 from contfric.continuation.half_branch import first_point
-from contfric.continuation.located_event import ROUGH, bifurcation_at
+from contfric.continuation.located_event import ROUGH, bifurcation_at, event_in
 from contfric.continuation.locating.change_of_sign import locate_change, locate_label
-from contfric.continuation.points import EXTRA, Point, Settings
+from contfric.continuation.points import EXTRA, Point
 from contfric.continuation.singular_points.folds import (
     NEAR_ONE,
     SHORTEST_OVERSHOOT,
@@ -35,6 +36,7 @@ from contfric.continuation.singular_points.vertices import (
     symmetric_part,
     undoubled_part,
 )
+from contfric.continuation.step import Step
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.events.doubling_point import opens_through
 from contfric.orbit.orbit import Orbit
@@ -55,22 +57,21 @@ _NEARBY = 0.01
 _COMPLEX = 1e-6
 
 
-def smooth_events(
-    orbit: Orbit, before: Point, after: Point, settings: Settings, beyond: Point
-) -> list[Located]:
-    """Return folds, branch points, doublings, tori and tangencies; ``beyond`` is good after them."""
+def smooth_events(step: Step) -> list[Located]:
+    """Return folds, branch points, doublings, tori and tangencies."""
     from contfric.continuation.core.locate import BY_TEST
     from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
 
-    base, active = len(before.tests) - EXTRA, orbit.model.index_of(settings.parameter)
-    size = min(1.0, orbit.model.size_of(active, before.value))
+    orbit, before = step.orbit, step.before
+    base = len(before.tests) - EXTRA
+    size = min(1.0, orbit.model.size_of(step.active, before.value))
     # events after a sliding one do not happen
-    slides = beyond is not after
-    after = last_told(orbit, before, after, beyond, settings) or after
-    told = first_told(orbit, before, after, settings)
+    slides = step.beyond is not step.after
+    step = replace(step, after=last_told(step) or step.after)
+    told = first_told(step)
     values = zip(
         [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()],
-        after.tests[base:].tolist(),
+        step.after.tests[base:].tolist(),
         strict=True,
     )
     found: list[Located] = []
@@ -80,66 +81,62 @@ def smooth_events(
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL * (size if column == FOLD else 1.0):
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        if column != FOLD and _is_rounding(orbit, told, after, base + column, settings):
+        if column != FOLD and _is_rounding(replace(step, before=told), base + column):
             continue
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         may_cross = column == CHI_ONE and orbit.model.symmetry is None
-        if may_cross and not _passes_vertex(orbit, before, after, share, settings):
-            crossing = crossing_in(orbit, before, after, beyond, share, settings)
+        if may_cross and not _passes_vertex(step, share):
+            crossing = crossing_in(step, share)
             if crossing is not None:
                 found.append(crossing)
                 continue
         first = before if column == FOLD else told
-        point = locate_change(orbit, first, after, settings, BY_TEST, base + column)
+        point = locate_change(orbit, first, step.after, step.settings, BY_TEST, base + column)
         lost = point is None or point.lost
         if point is not None and (lost or _is_pole(point.tests[base + column], a, b)):
             point = None
         if column == FOLD:
             folded = True
-            folds = (
-                fold_between(orbit, before, after, beyond, share, settings)
-                if point is None
-                else fold_at(orbit, before, after, beyond, point, settings)
-            )
-            at_end = slides and _is_at_end(before, after, share, settings)
+            folds = fold_between(step, share) if point is None else fold_at(step, point)
+            at_end = slides and _is_at_end(step, share)
             found += [
                 fold
                 for fold in folds
-                if not (
-                    _is_sliding(orbit, before, fold[0], active) or (at_end and not fold[0].located)
-                )
+                if not (_is_sliding(step, fold[0]) or (at_end and not fold[0].located))
             ]
         elif point is not None:
-            found += _at_multiplier(orbit, column, before, beyond, point, settings)
+            found += _at_multiplier(step, column, point)
         elif lost:  # a pole is no event: multipliers are infinite where an exit becomes tangential
             half = orbit.system.half or column == CHI_ONE
             kind = Kind.NS if column == CHI_PAIR else Kind.BP if half else Kind.PD
-            found.append(_overshot(orbit, kind, before, after, beyond, settings))
+            found.append(_overshot(step, kind))
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
-    return [*found, *tangencies(orbit, before, beyond, settings)]
+    return [*found, *tangencies(replace(step, after=step.beyond))]
 
 
-def _is_sliding(orbit: Orbit, before: Point, fold: Bifurcation, active: int) -> bool:
+def _is_sliding(step: Step, fold: Bifurcation) -> bool:
     """Tell whether a fold is the sliding event next to it: slopes are rounding where curves cross."""
     left = float(fold.orbit.margins.min(initial=np.inf))
     if fold.kind is not Kind.SN or not (fold.located and left < _OUTSIDE):
         return False
-    here = before.orbit(orbit, active)
+    here = step.orbit_at(step.before)
     return left < _FALLEN * float(here.margins.min(initial=np.inf))
 
 
-def _is_at_end(before: Point, after: Point, share: float, settings: Settings) -> bool:
+def _is_at_end(step: Step, share: float) -> bool:
     """Tell whether a slope changes its sign so near to a sliding event that a fold there is a part of it.
 
     Where the parameter stands at the event its slope there is rounding, and Newton's method may fail at the
     zero of rounding.
     """
-    left = (1.0 - share) * (after.arc - before.arc)
-    return left < SAME_FOLD and 0.5 * abs(after.slope) * left < SAME_VALUE * settings.width
+    left = (1.0 - share) * step.length
+    return (
+        left < SAME_FOLD and 0.5 * abs(step.after.slope) * left < SAME_VALUE * step.settings.width
+    )
 
 
-def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings: Settings) -> bool:
+def _is_rounding(step: Step, index: int) -> bool:
     """Tell whether a function of the multipliers changes its sign over a short step by rounding.
 
     Where a slip shrinks to nothing, of duration d, its ends are reached at rates of order d and d^2: times
@@ -147,30 +144,26 @@ def _is_rounding(orbit: Orbit, before: Point, after: Point, index: int, settings
     the orbit is known well. What changes smoothly changes in proportion to the step, or like its root at an
     end; rounding is as large between two points however near they are.
     """
-    step = after.arc - before.arc
+    before, after = step.before, step.after
     # next to an exit without a rate a multiplier has a pole, to which no point is told nearer than this
-    small = min(_NUDGE * step, 0.01 * SAME_LOCATION)
-    if not (step < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
+    small = min(_NUDGE * step.length, 0.01 * SAME_LOCATION)
+    if not (step.length < _SHORT and np.isfinite([before.tests[index], after.tests[index]]).all()):
         return False
     over_step = abs(float(after.tests[index] - before.tests[index]))
     return any(
-        _change_next_to(orbit, point, shift, index, settings) > _ERRATIC * over_step
+        _change_next_to(step, point, shift, index) > _ERRATIC * over_step
         for point, shift in ((before, small), (after, -small))
     )
 
 
-def _change_next_to(
-    orbit: Orbit, point: Point, shift: float, index: int, settings: Settings
-) -> float:
+def _change_next_to(step: Step, point: Point, shift: float, index: int) -> float:
     """Return by how much a test changes over a shift along the branch; 0 where no orbit is found there."""
-    moved = point.along(orbit, orbit.model.index_of(settings.parameter), shift)
-    near = first_point(moved, settings, point.tangent, point.slope)
+    moved = point.along(step.orbit, step.active, shift)
+    near = first_point(moved, step.settings, point.tangent, point.slope)
     return 0.0 if near is None else abs(float(near.tests[index] - point.tests[index]))
 
 
-def _at_multiplier(
-    orbit: Orbit, column: int, before: Point, beyond: Point, point: Point, settings: Settings
-) -> list[Located]:
+def _at_multiplier(step: Step, column: int, point: Point) -> list[Located]:
     """Return what a multiplier on the unit circle is: a branch point, a doubling, a torus, or nothing."""
     from contfric.continuation.core.steps import CHI_MINUS, CHI_PAIR
 
@@ -181,27 +174,23 @@ def _at_multiplier(
         if abs(point.mu[0].imag) < _COMPLEX:
             return []  # two real multipliers with product 1: nothing happens
         kind = Kind.NS
-    elif column == CHI_MINUS and not orbit.system.half:
+    elif column == CHI_MINUS and not step.orbit.system.half:
         kind = Kind.PD
-    active = orbit.model.index_of(settings.parameter)
-    here = point.orbit(orbit, active)
-    if kind is Kind.BP and not orbit.system.half and _is_vertex(here, active):
+    active, here = step.active, step.orbit_at(point)
+    if kind is Kind.BP and not here.system.half and _is_vertex(here, active):
         return []  # the fold there says what it is; near it chi(1) is rounding
-    event = bifurcation_at(kind, here, before, beyond, point, settings)
+    event = event_in(step, kind, here, point)
     if column == CHI_MINUS and not opens_through(here, active):
         event = altered(event, bound=ROUGH)
     return [(event, point)]
 
 
-def _passes_vertex(
-    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
-) -> bool:
+def _passes_vertex(step: Step, share: float) -> bool:
     """Tell whether a step passes the vertex of a pitchfork or a doubling: its fold says what it is."""
-    if orbit.system.half:
+    if step.orbit.system.half:
         return False
-    active = orbit.model.index_of(settings.parameter)
-    between = parabola_vertex(before, after, share)
-    return _is_vertex(between.orbit(orbit, active), active)
+    between = parabola_vertex(step.before, step.after, share)
+    return _is_vertex(step.orbit_at(between), step.active)
 
 
 def _is_vertex(here: Orbit, active: int) -> bool:
@@ -209,18 +198,15 @@ def _is_vertex(here: Orbit, active: int) -> bool:
     return (symmetric_part(here, active) or undoubled_part(here, active)) is not None
 
 
-def _overshot(
-    orbit: Orbit, kind: Kind, before: Point, after: Point, beyond: Point, settings: Settings
-) -> Located:
+def _overshot(step: Step, kind: Kind) -> Located:
     """Return what stands for a step between whose ends no branch is found: it is to be taken back.
 
     A step as short as can be is not: then the event is reported as not located.
     """
-    if after.arc - before.arc <= SHORTEST_OVERSHOOT:
-        return not_located(orbit, kind, before, beyond, settings)
-    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
-    found = bifurcation_at(kind, here, before, beyond, before, settings)
-    return found, altered(before, lost=True)
+    if step.length <= SHORTEST_OVERSHOOT:
+        return not_located(step, kind)
+    found = event_in(step, kind, step.orbit_at(step.before), step.before)
+    return found, altered(step.before, lost=True)
 
 
 def _is_pole(value: float, a: float, b: float) -> bool:
@@ -228,44 +214,38 @@ def _is_pole(value: float, a: float, b: float) -> bool:
     return not np.isfinite(value) or abs(value) > 2.0 * max(abs(a), abs(b))
 
 
-def tangencies(orbit: Orbit, before: Point, after: Point, settings: Settings) -> list[Located]:
-    """Return the events T: changes of the surfaces that a segment crosses.
+def tangencies(step: Step) -> list[Located]:
+    """Return the events T of a step: changes of the surfaces that a segment crosses.
 
     At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.
     """
     found: list[Located] = []
-    for k in (before.labels != after.labels).nonzero()[0].tolist():
-        found += _changes(orbit, before, after, settings, k)
-    found += _undone(orbit, before, after, settings, found)
-    return _once(found) if orbit.model.joined else found
+    for k in (step.before.labels != step.after.labels).nonzero()[0].tolist():
+        found += _changes(step, k)
+    found += _undone(step, found)
+    return _once(found) if step.orbit.model.joined else found
 
 
-def _changes(
-    orbit: Orbit, before: Point, after: Point, settings: Settings, k: int
-) -> list[Located]:
+def _changes(step: Step, k: int) -> list[Located]:
     """Return the changes of one label between two points at which it differs."""
     found: list[Located] = []
-    active = orbit.model.index_of(settings.parameter)
-    locations = locate_label(orbit, before, after, settings, k)
+    orbit, settings = step.orbit, step.settings
+    locations = locate_label(orbit, step.before, step.after, settings, k)
     if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
         locations.pop()
-    if not locations and not (
-        _vanishes(orbit, k, (before, after), active) or _meets(orbit, k, after, active)
-    ):
-        found.append(not_located(orbit, Kind.T, before, after, settings))
+    if not locations and not (_vanishes(step, k) or _meets(orbit, k, step.orbit_at(step.after))):
+        found.append(not_located(step, Kind.T))
     for point in locations:
         if point.tests[: len(orbit.system.tests)].min(initial=0.0) < -_OUTSIDE:
             continue  # where curves cross a trial may lie on another one
-        here = point.orbit(orbit, active)
+        here = step.orbit_at(point)
         test = EventFunction(*_label_location(orbit, k))
         b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
         found.append((b, point))
     return found
 
 
-def _undone(
-    orbit: Orbit, before: Point, after: Point, settings: Settings, others: list[Located]
-) -> list[Located]:
+def _undone(step: Step, others: list[Located]) -> list[Located]:
     """Return the changes of labels that are the same at both ends of a step in which others change.
 
     One touch may go from segment to segment: what it changes in one of them is undone soon. So labels are
@@ -273,7 +253,7 @@ def _undone(
     """
     from contfric.continuation.core.locate import BY_PARAMETER
 
-    active = orbit.model.index_of(settings.parameter)
+    orbit, before, after = step.orbit, step.before, step.after
     found: list[Located] = []
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
     for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
@@ -281,18 +261,18 @@ def _undone(
             continue
         sides = [(one, _NEARBY)] * near + [(other, -_NEARBY)] * far
         for point, share in sides:
-            asked = point.along(orbit, active, share * (other.arc - one.arc)).labels
+            asked = point.along(orbit, step.active, share * (other.arc - one.arc)).labels
             if not ((before.labels == after.labels) & (asked != before.labels)).any():
                 continue
             value = point.value + share * (other.value - one.value)
-            nearby = locate_change(orbit, one, other, settings, BY_PARAMETER, 0, value)
+            nearby = locate_change(orbit, one, other, step.settings, BY_PARAMETER, 0, value)
             if nearby is None or nearby.lost:
                 continue
             same = (before.labels == after.labels) & (nearby.labels != before.labels)
             for k in np.flatnonzero(same).tolist():
                 changes = [
-                    *_changes(orbit, before, nearby, settings, k),
-                    *_changes(orbit, nearby, after, settings, k),
+                    *_changes(replace(step, after=nearby, beyond=nearby), k),
+                    *_changes(replace(step, before=nearby), k),
                 ]
                 found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
     return found
@@ -303,21 +283,22 @@ def _apart(one: Located, other: Located) -> bool:
     return one[0].located and abs(one[1].arc - other[1].arc) > SAME_TANGENCY
 
 
-def _vanishes(orbit: Orbit, k: int, points: tuple[Point, Point], active: int) -> bool:
-    """Tell whether the segment of a label, or one next to it, has no length at one of two points."""
-    i, n = int(orbit.system.layout.labels[k][0]), orbit.system.segments
+def _vanishes(step: Step, k: int) -> bool:
+    """Tell whether the segment of a label, or one next to it, has no length at an end of a step."""
+    system = step.orbit.system
+    i, n = int(system.layout.labels[k][0]), system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
-    motions = (point.orbit(orbit, active) for point in points)
+    motions = map(step.orbit_at, (step.before, step.after))
     return any(np.any((m.ends - m.cycle)[near, 0] < NO_LENGTH) for m in motions)
 
 
-def _meets(orbit: Orbit, k: int, point: Point, active: int) -> bool:
+def _meets(orbit: Orbit, k: int, here: Orbit) -> bool:
     """Tell whether a joint of the segment of a label lies on a surface that it does not end on.
 
     At an event it does, and where that is known to the root of rounding what the segment crosses is, too.
     """
     i, c, came, goes = (int(number) for number in orbit.system.layout.labels[k][:4])
-    model, here = orbit.model, point.orbit(orbit, active)
+    model = orbit.model
     observable = model.observables[c].name
     for joint, own in ((here.begins[i], came), (here.ends[i], goes)):
         value = here.flow.observe(observable, float(joint[0]), joint[1:])

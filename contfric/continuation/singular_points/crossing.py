@@ -24,6 +24,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.linear import equations_at
 from contfric.bvp.system import System
 from contfric.continuation.points import Point, Settings
+from contfric.continuation.step import Step
 from contfric.orbit.orbit import Orbit, Status
 
 #: Smallest singular value of J against the largest, above which no branch point is near. Near one it is
@@ -234,16 +235,14 @@ def _direction(problem: _ChainProblem, d: FloatArray) -> Direction:
     return Direction(d[:-1].reshape(count, -1).copy(), slope)
 
 
-def crossing_between(
-    orbit: Orbit, before: Point, after: Point, share: float, settings: Settings
-) -> tuple[Crossing, Point] | None:
-    """Return the branch point between two points of a branch, and the point of the branch there.
+def crossing_between(step: Step, share: float) -> tuple[Crossing, Point] | None:
+    """Return the branch point in a step of a branch, and the point of the branch there.
 
     Parameters
     ----------
     share : where it is looked for, as a share of the step
     """
-    active = orbit.model.index_of(settings.parameter)
+    before, after, settings = step.before, step.after, step.settings
     near = replace(
         before,
         joints=before.joints + share * (after.joints - before.joints),
@@ -251,20 +250,20 @@ def crossing_between(
     )
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
-    step, here = float(np.sqrt(square)), near.orbit(orbit, active)
-    blurred = _BESIDE * step + _blur(near, orbit.model.rounding)
-    crossing = crossing_near(here, settings, 2.0 * (step + blurred))
+    length = float(np.sqrt(square))
+    blurred = _BESIDE * length + _blur(near, step.orbit.model.rounding)
+    crossing = crossing_near(step.orbit_at(near), settings, 2.0 * (length + blurred))
     if crossing is None:
         return None
     way = (
         crossing.orbit.joints - before.joints,
-        float(crossing.orbit.vector[active]) - before.value,
+        float(crossing.orbit.vector[step.active]) - before.value,
     )
     at = _product(chord, way, settings.scale) / square
-    far = np.sqrt(_product(way, way, settings.scale)) > step + blurred
-    if far or not -blurred < at * step < step + blurred:
+    far = np.sqrt(_product(way, way, settings.scale)) > length + blurred
+    if far or not -blurred < at * length < length + blurred:
         return None
-    arc = min(1.0, max(0.0, at)) * (after.arc - before.arc)
+    arc = min(1.0, max(0.0, at)) * step.length
     return crossing, crossing_point(crossing, before, arc, settings)
 
 
