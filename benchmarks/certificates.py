@@ -25,7 +25,7 @@ import numpy as np
 
 import contfric as cf
 from contfric.certify.files import certificate_data
-from contfric.certify.tube_file import tubes_of
+from contfric.certify.tubes.tube_file import tubes_of
 from contfric.errors import ContfricError
 from contfric.models.balls.build import ball_model
 from contfric.verify.file import check_text

@@ -21,7 +21,7 @@ import numpy as np
 import contfric as cf
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
-from contfric.continuation.switching import null_vector
+from contfric.continuation.singular_points.switching import null_vector
 from contfric.orbit.solve import refine
 
 #: Points of each curve that are compared, and points of each side of a run.

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 import contfric as cf
-from contfric.continuation.switching import null_vector
+from contfric.continuation.singular_points.switching import null_vector
 from contfric.orbit.solve import refine
 
 #: How far next to a point the run starts, and how far it goes.

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.base.arrays import FloatArray
-from contfric.chaos.rows import check_excited
 from contfric.errors import ContfricError
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
@@ -91,7 +90,6 @@ def two_orbit_estimate(
     """
     model, params = tied(model, params)
     vector = model.vector(params)
-    check_excited(model, vector)
     begun = simulate(model, params, state=state, time=time, periods=transient)
     period = model.view(vector).period
     start = time + transient * period

@@ -19,7 +19,7 @@ from contfric.atlas.short_branches import is_short
 from contfric.bvp.conserved import conserved
 from contfric.bvp.margins import EventFunction
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import is_continuum
+from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
 from contfric.errors import ContfricError

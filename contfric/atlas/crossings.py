@@ -11,9 +11,9 @@ from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import settings_for
 from contfric.base.arrays import FloatArray
 from contfric.continuation.branch import Branch
-from contfric.continuation.crossing import Crossing, Direction
 from contfric.continuation.points import FIRST_STEP, Settings
-from contfric.continuation.switching import LEAVE, leave_along
+from contfric.continuation.singular_points.crossing import Crossing, Direction
+from contfric.continuation.singular_points.switching import LEAVE, leave_along
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError
 from contfric.events.bifurcation import Decision, EndReason

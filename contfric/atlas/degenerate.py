@@ -16,7 +16,7 @@ import numpy as np
 
 from contfric.atlas.matching import stops_distance
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import is_continuum
+from contfric.continuation.families.continuum import is_continuum
 from contfric.events.bifurcation import Bifurcation, Kind
 
 if TYPE_CHECKING:

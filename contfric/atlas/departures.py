@@ -11,11 +11,11 @@ from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
 from contfric.atlas.matching import same_event
 from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
-from contfric.continuation.crossing import Direction
 from contfric.continuation.events_of_step import violates
 from contfric.continuation.half_branch import Side
 from contfric.continuation.points import FIRST_STEP, Settings
-from contfric.continuation.switching import (
+from contfric.continuation.singular_points.crossing import Direction
+from contfric.continuation.singular_points.switching import (
     NEARER,
     BranchStart,
     leave_along,

@@ -18,8 +18,8 @@ from contfric.atlas.matching import (
 )
 from contfric.base.interrupts import held_back
 from contfric.continuation.branch import Branch
-from contfric.continuation.openings import with_openings
 from contfric.continuation.points import Settings
+from contfric.continuation.singular_points.openings import with_openings
 from contfric.events.bifurcation import (
     ACCURACY,
     TERMINAL,

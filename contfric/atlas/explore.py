@@ -26,8 +26,8 @@ from contfric.base.attributes import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.points import MOST_POINTS, Settings, settings_of
+from contfric.continuation.singular_points.vertices import symmetrised
 from contfric.continuation.trace import continue_orbit, follow_orbit
-from contfric.continuation.vertices import symmetrised
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.events.bifurcation import EndReason
 from contfric.orbit.orbit import Orbit

@@ -12,10 +12,10 @@ from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
 from contfric.atlas.matching import SAME_SOLUTION, stops_apart
-from contfric.continuation.continuum import is_continuum
+from contfric.continuation.families.continuum import is_continuum
+from contfric.continuation.families.vertical import family_near
 from contfric.continuation.points import Settings, next_to
 from contfric.continuation.trace import follow_family
-from contfric.continuation.vertical import family_near
 from contfric.events.bifurcation import TERMINAL, End, Kind
 from contfric.events.candidates import candidates
 from contfric.orbit.orbit import Orbit

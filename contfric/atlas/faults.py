@@ -8,9 +8,9 @@ from itertools import chain
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.continuation.accuracy.moved_by_errors import duration_error
 from contfric.continuation.branch import Branch
 from contfric.continuation.located_event import ROUGH
-from contfric.continuation.moved_by_errors import duration_error
 from contfric.events.standing_slides import STANDS, goes_nowhere
 from contfric.orbit.one_way import only_grows
 from contfric.orbit.orbit import Orbit

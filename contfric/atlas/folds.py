@@ -1,8 +1,8 @@
 """Orbits that are born where a bridge folds: sequences of both arms of its passages.
 
-If passages fold by themselves (:mod:`contfric.continuation.arms`), every cyclic sequence of their arms is
-a candidate, over as many periods as at a sliding event: one of the two holds of a symmetric bridge may be the
-shorter one, and the other one the longer.
+If passages fold by themselves (:mod:`contfric.continuation.singular_points.arms`), every cyclic sequence of
+their arms is a candidate, over as many periods as at a sliding event: one of the two holds of a symmetric
+bridge may be the shorter one, and the other one the longer.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from contfric.atlas.collect import Event
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving_event import first_end, settings_for
-from contfric.continuation.arms import Arms, arms_at
 from contfric.continuation.assembly import assemble
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point
-from contfric.continuation.switching import NEARER, start_beside
+from contfric.continuation.singular_points.arms import Arms, arms_at
+from contfric.continuation.singular_points.switching import NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import Decision, EndReason, Kind
 from contfric.events.sequences import MOST_SEQUENCES, count, lengths, necklaces

@@ -40,9 +40,9 @@ from contfric.atlas.splitting import follow_split
 from contfric.bvp.conserved import conserved
 from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import in_continuum
-from contfric.continuation.crossing import LOCATED, crossing_near
+from contfric.continuation.families.continuum import in_continuum
 from contfric.continuation.points import Settings
+from contfric.continuation.singular_points.crossing import LOCATED, crossing_near
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.events.candidates import Candidate, sequences_of
 from contfric.events.from_simulation import solutions_near

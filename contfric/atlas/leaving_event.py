@@ -18,7 +18,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.switching import LEAVE, NEARER, start_beside
+from contfric.continuation.singular_points.switching import LEAVE, NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
 from contfric.events.candidates import Candidate, directions

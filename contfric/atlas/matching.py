@@ -12,7 +12,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import is_continuum
+from contfric.continuation.families.continuum import is_continuum
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import Model
 from contfric.orbit.itineraries import mirror_pairs, whole_of

@@ -31,8 +31,13 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.switching import LEAVE, null_vector, settings_value
-from contfric.continuation.vertices import symmetric_part, symmetrised, undoubled, undoubled_part
+from contfric.continuation.singular_points.switching import LEAVE, null_vector, settings_value
+from contfric.continuation.singular_points.vertices import (
+    symmetric_part,
+    symmetrised,
+    undoubled,
+    undoubled_part,
+)
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
 from contfric.events.candidates import Candidate
 from contfric.events.doubling_point import solved_at_vertex

@@ -26,7 +26,7 @@ from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_locatio
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import lost_in_end
+from contfric.continuation.ends.at_events import lost_in_end
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, EndReason

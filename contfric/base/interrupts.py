@@ -42,7 +42,8 @@ def held_back() -> Iterator[Callable[[], None]]:
     try:
         yield now
     finally:
-        _restore(before)
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
     now()
 
 
@@ -55,11 +56,6 @@ def _exchanged(handler: Any) -> Any:
         return None
     signal.signal(signal.SIGINT, handler)
     return before
-
-
-def _restore(before: Any) -> None:
-    if before is not None:
-        signal.signal(signal.SIGINT, before)
 
 
 @cache

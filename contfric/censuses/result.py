@@ -169,7 +169,7 @@ class Census(Shown):
         """Return the orbits as text with aligned columns."""
         rows = [["name", "periods", "stops", "images", "stable", "multipliers", "signature"]]
         for orbit in self.orbits:
-            multipliers = ", ".join(f"{_plain(mu):.6g}" for mu in orbit.multipliers)
+            multipliers = ", ".join(f"{mu if mu.imag else mu.real:.6g}" for mu in orbit.multipliers)
             counts = (orbit.periods, len(orbit.stops), images_of(orbit))
             texts = [str(count) for count in counts]
             rows.append(
@@ -211,10 +211,6 @@ def stability_of(orbit: Orbit) -> str:
     if np.any(np.abs(size - 1.0) < DEGENERATE) and not np.any(size > 1.0 + DEGENERATE):
         return "marginal"
     return "yes" if orbit.stable else "no"
-
-
-def _plain(value: complex) -> complex | float:
-    return value if value.imag else value.real
 
 
 def _multipliers(orbit: Orbit) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Prove a branch: a tube of overlapping boxes along it.
 
-In each box (:mod:`contfric.certify.tube`) the orbits are one smooth curve, and neighbours hold the same
+In each box (:mod:`contfric.certify.tubes.tube`) the orbits are one smooth curve, and neighbours hold the same
 one: the end of each box lies inside of the next. So between the first and the last box of a stretch there
 is one curve, and inside of the boxes no second one. In each box every inequality holds over the whole of
 every segment, the parameter is monotone, or a fold may be in it, and no multiplier of a turn is -1, or
@@ -21,8 +21,8 @@ from contfric.base.shown import Shown
 from contfric.certify.certificate import Certificate
 from contfric.certify.events import EventCertificate, certify_event
 from contfric.certify.orbit import certify_orbit, with_inequalities
-from contfric.certify.piece import Piece
-from contfric.certify.tracing import Tracer
+from contfric.certify.tubes.piece import Piece
+from contfric.certify.tubes.tracing import Tracer
 from contfric.certify.verdict import Finding, Verdict
 from contfric.continuation.branch import Branch
 from contfric.errors import ParameterError
@@ -100,7 +100,7 @@ class BranchCertificate(Shown):
         """
         from contfric.certify.diagram_certificate import LEFT_OUT, UNCHECKED
         from contfric.certify.files import checkable, checked, write_data
-        from contfric.certify.tube_file import tubes_of
+        from contfric.certify.tubes.tube_file import tubes_of
 
         parts = [*checkable([*self.proofs, *self.points]), *tubes_of(self)]
         if not parts:

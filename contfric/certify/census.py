@@ -6,8 +6,8 @@ later the same release comes again. Where what follows a release is a smooth fun
 period are covered with intervals (branch and bound). On each of them
 
 * no release is possible, as the load at rest falls; or
-* of all solutions that are released in it (:mod:`contfric.certify.following`) none is released again T
-  later; or
+* of all solutions that are released in it (:mod:`contfric.certify.releases.following`) none is released again
+  T later; or
 * there is one such release, smooth in the phase, and g' has a sign: g has one zero if its signs at the ends
   differ, and none if they do not.
 
@@ -66,6 +66,6 @@ def certify_census(model: ModelSource, params: Parameters | None = None) -> Cens
             f"certify_census is offered for the model '{', '.join(CHECKED_MODELS)}', not for "
             f"'{model.name}': its law at stops and releases is written down for that one"
         )
-    from contfric.certify.census_search import searched
+    from contfric.certify.releases.census_search import searched
 
     return searched(model, model.vector(params))

@@ -29,7 +29,7 @@ from contfric.certify.diagram_certificate import (
 from contfric.certify.events import EventCertificate, certify_event
 from contfric.certify.files import checkable, checked
 from contfric.certify.limit import LATE, latest
-from contfric.certify.tube_file import tubes_of
+from contfric.certify.tubes.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
 from contfric.continuation.branch import Branch
 from contfric.events.bifurcation import Bifurcation

@@ -1,8 +1,8 @@
 """Prove a located event: its parameter to 30 digits, its kind, and that it is nondegenerate.
 
-The extended system of :mod:`contfric.certify.extended` has exactly one zero in a thin box around Newton's
-limit, and its Jacobian is regular there. The orbit at the event obeys every inequality, but for the one
-that is the event. What tells kinds apart is a sign: at a stop on ``|u| = S0`` the load grows (CS) or
+The extended system of :mod:`contfric.certify.equations.extended` has exactly one zero in a thin box around
+Newton's limit, and its Jacobian is regular there. The orbit at the event obeys every inequality, but for the
+one that is the event. What tells kinds apart is a sign: at a stop on ``|u| = S0`` the load grows (CS) or
 falls (SS), a touch has a second derivative.
 """
 
@@ -16,9 +16,10 @@ from flint import arb, arb_mat
 
 from contfric.base.shown import Shown
 from contfric.bvp.margins import EventFunction, Margin
-from contfric.certify.chain import Chain, Segments, segments_of
-from contfric.certify.closing import closing_of, is_symmetry
-from contfric.certify.extended import (
+from contfric.certify.enclosures.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
+from contfric.certify.equations.chain import Chain, Segments, segments_of
+from contfric.certify.equations.closing import closing_of, is_symmetry
+from contfric.certify.equations.extended import (
     Builder,
     at_joint,
     null_vector,
@@ -28,11 +29,10 @@ from contfric.certify.extended import (
     with_multiplier,
     with_pair,
 )
-from contfric.certify.inequalities import Touch, grazes_at_end, inequalities
-from contfric.certify.kept import Kept, with_kept
-from contfric.certify.krawczyk import Equations, Inclusion, approximate_inverse, enclosed
+from contfric.certify.equations.kept import Kept, with_kept
+from contfric.certify.equations.locating import EventPlace, NotLocatedError, location_of
+from contfric.certify.inequalities.along_segments import Touch, grazes_at_end, inequalities
 from contfric.certify.limit import LATE, TimeOverError, check_time
-from contfric.certify.locating import EventPlace, NotLocatedError, location_of
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.errors import ParameterError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind

@@ -4,7 +4,7 @@ If f^n is continuous on disjoint intervals K_1 .. K_m within an interval W of ph
 covers W, then every sequence of numbers 1 .. m is that of a solution, and the topological entropy of f is at
 least ``log(m) / n`` (L. S. Block and W. A. Coppel, Dynamics in One Dimension, 1992, chapter II). Where such
 intervals are is a question of sampling; that they are such ones is proved: the images of their ends lie on
-both sides of W, and f^n is continuous on each of them (:mod:`contfric.certify.returns`).
+both sides of W, and f^n is continuous on each of them (:mod:`contfric.certify.releases.returns`).
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from flint import arb
 
 from contfric.base.arrays import FloatArray, IntArray
-from contfric.certify.returns import Release, ReturnMap
-from contfric.certify.stretch import LineInS, UndecidedError
+from contfric.certify.releases.returns import Release, ReturnMap
+from contfric.certify.releases.stretch import LineInS, UndecidedError
 from contfric.models.balls.numbers import working
 from contfric.models.definition import Model
 

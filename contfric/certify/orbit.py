@@ -1,14 +1,14 @@
 r"""Prove a computed orbit.
 
-1. Interval Newton (:mod:`contfric.certify.krawczyk`) on the chain of segments, in a box around the printed
-   joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.
+1. Interval Newton (:mod:`contfric.certify.enclosures.krawczyk`) on the chain of segments, in a box around the
+   printed joints that is ten times as wide as the orbit's stated error: there is exactly one solution in it.
 2. Within that box Newton's method goes on in many digits: its last residual bounds how far the solution is
    from it, to 1e-30. (Where the first box fails: interval Newton in a thin one around the limit.)
 3. With that, every inequality over every segment, and the multipliers. What is not decided is tried again
    with twice the digits.
 
 Where a contact never slips the orbits are a continuum. One of them is proved, alone among those that keep
-the same (:mod:`contfric.certify.kept`).
+the same (:mod:`contfric.certify.equations.kept`).
 
 The stated error of the joints is what rounding of the flow and the residual do to them:
 ``|C| rho`` with C the inverse of the Jacobian and rho the rounding of one equation.
@@ -22,15 +22,15 @@ from dataclasses import replace
 from flint import acb, arb, arb_mat
 
 from contfric.certify.certificate import Certificate
-from contfric.certify.chain import Chain, Segments, segments_of
-from contfric.certify.closing import closing_of, is_symmetry
-from contfric.certify.inequalities import inequalities
-from contfric.certify.kept import with_kept
-from contfric.certify.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
+from contfric.certify.enclosures.krawczyk import approximate_inverse, enclosed, krawczyk, narrowed
+from contfric.certify.equations.chain import Chain, Segments, segments_of
+from contfric.certify.equations.closing import closing_of, is_symmetry
+from contfric.certify.equations.kept import with_kept
+from contfric.certify.equations.multipliers import poincare_map, stability, turn_multipliers
+from contfric.certify.equations.zeros import zeros_at_joints
+from contfric.certify.inequalities.along_segments import inequalities
 from contfric.certify.limit import LATE, TimeOverError, check_time
-from contfric.certify.multipliers import poincare_map, stability, turn_multipliers
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.certify.zeros import zeros_at_joints
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.orbit import Orbit

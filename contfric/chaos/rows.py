@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from contfric.base.arrays import FloatArray, IntArray
-from contfric.errors import ParameterError
 from contfric.models.definition import Model
 from contfric.models.mode_domains import cut_bounds
 from contfric.simulation.tables import tables
@@ -192,18 +191,3 @@ def until_interrupted(kernel: Any, arguments: tuple[Any, ...], flag: IntArray | 
 def new_stop() -> IntArray:
     """Return what :func:`follow` is told to end by."""
     return np.zeros(1, dtype=np.int64)
-
-
-def check_excited(model: Model, vector: FloatArray) -> None:
-    """Refuse a model without a period, where solutions are compared at the same times.
-
-    Raises
-    ------
-    ParameterError
-        If the model is autonomous.
-    """
-    if not model.view(vector).period > 0.0:
-        raise ParameterError(
-            f"model '{model.name}' has no period of excitation: two solutions are compared for models "
-            "that are excited periodically (lyapunov_exponent takes any model)"
-        )

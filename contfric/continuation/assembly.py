@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.continuation.branch import Branch
-from contfric.continuation.continuum import continua_of
+from contfric.continuation.families.continuum import continua_of
+from contfric.continuation.families.passed import with_families
 from contfric.continuation.half_branch import Side
-from contfric.continuation.openings import with_openings
-from contfric.continuation.passed_families import with_families
 from contfric.continuation.points import Point, Settings
+from contfric.continuation.singular_points.openings import with_openings
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, Kind
 from contfric.orbit.orbit import Orbit
 

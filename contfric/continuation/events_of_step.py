@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.continuation.accuracy import not_critical
-from contfric.continuation.ending import end_at_limit, ends_at, is_point, never_leaves, passes_point
+from contfric.continuation.accuracy.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
+from contfric.continuation.accuracy.rounding import not_critical
+from contfric.continuation.ends.at_events import (
+    end_at_limit,
+    ends_at,
+    is_point,
+    never_leaves,
+    passes_point,
+)
+from contfric.continuation.ends.at_range import ends_at_limit, is_at_limit, limit_crossed, limit_end
+from contfric.continuation.ends.at_values import stop_between
+from contfric.continuation.ends.at_vertices import NEAREST, SHORTER
 from contfric.continuation.half_branch import Side
+from contfric.continuation.locating.sliding import nearly_reached, sliding_events
+from contfric.continuation.locating.smooth import SAME_TANGENCY, smooth_events
 from contfric.continuation.moving_joints import (
     LAST_CROSSING,
     is_known_touch,
     is_on_section,
     move_joints,
 )
-from contfric.continuation.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.continuation.points import EXTRA, Point, Settings
-from contfric.continuation.range_ends import ends_at_limit, is_at_limit, limit_crossed, limit_end
-from contfric.continuation.sliding import nearly_reached, sliding_events
-from contfric.continuation.smooth import SAME_TANGENCY, smooth_events
-from contfric.continuation.stopping import stop_between
-from contfric.continuation.vertex_ends import NEAREST, SHORTER
+from contfric.continuation.step import Step
 from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason, Kind
 from contfric.orbit.orbit import Orbit
 
@@ -174,14 +181,14 @@ def locate_events(
     """
     sliding = sliding_events(orbit, before, after, settings)
     if not sliding:
-        smooth = smooth_events(orbit, before, after, settings, after)
+        smooth = smooth_events(Step(orbit, before, after, after, settings))
         return sorted(smooth, key=lambda pair: pair[1].arc)
     end = sliding[0][1]
     if end.arc <= before.arc:  # it is at the first point: nothing comes before it
         return sliding
     smooth = [
         (b, point)
-        for b, point in smooth_events(orbit, before, after, settings, end)
+        for b, point in smooth_events(Step(orbit, before, after, end, settings))
         if point.arc < end.arc and not belongs_to(b, point, end, settings)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)

@@ -71,7 +71,7 @@ class Extremum:
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class _MeasuredStep:
     """A step of a branch with the quantity and its slope at both ends."""
 
     before: Point
@@ -102,11 +102,11 @@ class _ExtremumSearch:
         branch = self.branch
         return point.orbit(branch, branch.model.index_of(branch.parameter))
 
-    def step(self, before: Point, after: Point) -> _Step:
+    def step(self, before: Point, after: Point) -> _MeasuredStep:
         """Return a step with what is measured at its ends."""
-        return _Step(before, after, self.measured(before), self.measured(after))
+        return _MeasuredStep(before, after, self.measured(before), self.measured(after))
 
-    def dipping(self, step: _Step, slopes: FloatArray) -> list[_Step]:
+    def dipping(self, step: _MeasuredStep, slopes: FloatArray) -> list[_MeasuredStep]:
         """Return a step as two, cut where its slope has the other sign than at both ends; else as it is.
 
         Parameters
@@ -120,12 +120,12 @@ class _ExtremumSearch:
             measured = self.measured(middle)
             if float(measured.ahead[0]) * slopes[1] < 0.0:
                 return [
-                    _Step(step.before, middle, step.first, measured),
-                    _Step(middle, step.after, measured, step.last),
+                    _MeasuredStep(step.before, middle, step.first, measured),
+                    _MeasuredStep(middle, step.after, measured, step.last),
                 ]
         return [step]
 
-    def extrema(self, step: _Step, halvings: int) -> Iterator[tuple[Point, bool, float]]:
+    def extrema(self, step: _MeasuredStep, halvings: int) -> Iterator[tuple[Point, bool, float]]:
         """Yield (point, whether it is a maximum, slope left) of the extrema inside of a step."""
         p, q = float(step.first.ahead[0]), float(step.last.ahead[0])
         if p * q < 0.0:
@@ -141,8 +141,12 @@ class _ExtremumSearch:
         if middle is None:
             return
         measured = self.measured(middle)
-        yield from self.extrema(_Step(step.before, middle, step.first, measured), halvings - 1)
-        yield from self.extrema(_Step(middle, step.after, measured, step.last), halvings - 1)
+        yield from self.extrema(
+            _MeasuredStep(step.before, middle, step.first, measured), halvings - 1
+        )
+        yield from self.extrema(
+            _MeasuredStep(middle, step.after, measured, step.last), halvings - 1
+        )
 
     def _start(self) -> Orbit:
         return self.orbit_of(self.branch.joints[0], float(self.branch.values[0]))
@@ -179,7 +183,7 @@ def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
         (i, before), (j, after) = points[k], points[k + 1]
         if j != i + 1:
             continue  # no tangent at the point between them: an event
-        step = _Step(before, after, measured[k], measured[k + 1])
+        step = _MeasuredStep(before, after, measured[k], measured[k + 1])
         if not np.isfinite([step.first.value, step.last.value]).all():
             continue  # it is not defined all along
         if _flat_end(slopes[k : k + 4]):

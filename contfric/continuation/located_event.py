@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.bvp.system import EventFunction
-from contfric.continuation.accuracy import Estimate
+from contfric.continuation.accuracy.rounding import Estimate
 from contfric.continuation.points import Point, Settings
+from contfric.continuation.step import Step
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.events.sliding_kinds import load_stands_still
 from contfric.events.split_touch import splits
@@ -41,6 +42,11 @@ def bifurcation_at(
         bound=bound,
         parameter=settings.parameter,
     )
+
+
+def event_in(step: Step, kind: Kind, here: Orbit, point: Point) -> Bifurcation:
+    """Return the event at a point of a step."""
+    return bifurcation_at(kind, here, step.before, step.beyond, point, step.settings)
 
 
 def _stability(

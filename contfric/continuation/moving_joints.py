@@ -10,8 +10,8 @@ import numpy as np
 
 from contfric.bvp.system import Margin
 from contfric.continuation.half_branch import Side, first_point
+from contfric.continuation.locating.smooth import SAME_TANGENCY
 from contfric.continuation.points import Point, Settings
-from contfric.continuation.smooth import SAME_TANGENCY
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import moved

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.bvp.linear import null_space
-from contfric.continuation.continuum import LEVEL, in_continuum
+from contfric.continuation.families.continuum import LEVEL, in_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import EXTRA, Point, Settings, next_to
-from contfric.continuation.vertices import symmetrised
+from contfric.continuation.singular_points.vertices import symmetrised
 from contfric.errors import ConvergenceError
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.sections import canonical

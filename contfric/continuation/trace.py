@@ -18,7 +18,7 @@ import numpy as np
 
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
-from contfric.continuation.ending import (
+from contfric.continuation.ends.at_events import (
     AT_END,
     endless,
     grows,
@@ -27,17 +27,17 @@ from contfric.continuation.ending import (
     only_lengthens,
     slows_down,
 )
+from contfric.continuation.ends.at_range import is_at_limit, limit_end
+from contfric.continuation.ends.at_values import stop_among
+from contfric.continuation.ends.at_vertices import Overshoot, end_stalled, overshoots_vertex
 from contfric.continuation.events_of_step import end_of_holds, resolve
+from contfric.continuation.families.vertical import VerticalFamily, family_near
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.located_event import ROUGH
+from contfric.continuation.locating.sliding import nearly_reached
 from contfric.continuation.moving_joints import move_joints
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
-from contfric.continuation.range_ends import is_at_limit, limit_end
-from contfric.continuation.sliding import nearly_reached
 from contfric.continuation.start import start_of, too_fast
-from contfric.continuation.stopping import stop_among
-from contfric.continuation.vertex_ends import Overshoot, end_stalled, overshoots_vertex
-from contfric.continuation.vertical import VerticalFamily, family_near
 from contfric.errors import ConvergenceError, function_of
 from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason
 from contfric.orbit.orbit import Orbit

@@ -15,7 +15,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction
 from contfric.continuation.points import Point
-from contfric.continuation.vertices import passed_vertex, symmetrised, undoubled
+from contfric.continuation.singular_points.vertices import passed_vertex, symmetrised, undoubled
 from contfric.curves.locating import CurveStep
 from contfric.curves.meeting import with_multiplier
 from contfric.curves.problem import Problem

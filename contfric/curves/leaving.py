@@ -29,7 +29,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import Point
-from contfric.continuation.vertices import symmetric_part, undoubled_part
+from contfric.continuation.singular_points.vertices import symmetric_part, undoubled_part
 from contfric.curves.after_event import Start, itineraries_at, prove, starts_of
 from contfric.curves.births import simpler_problem
 from contfric.curves.curve import CurvePart

@@ -16,7 +16,7 @@ from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole
 from contfric.base.tally import tally
 from contfric.continuation.hermite import cubic_between
-from contfric.continuation.locate_change import sought_of
+from contfric.continuation.locating.change_of_sign import sought_of
 from contfric.continuation.points import Point, PointRows
 from contfric.curves.points import Conditioned, compiled_problem, solve_point
 

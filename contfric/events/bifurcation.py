@@ -224,7 +224,7 @@ class Bifurcation(MeasuredEvent):
         """How well the parameter is located, relative to the range.
 
         A bound of what rounding does to the equations of the event
-        (:mod:`contfric.continuation.accuracy`).
+        (:mod:`contfric.continuation.accuracy.rounding`).
         """
         return self.bound() if callable(self.bound) else self.bound
 

@@ -174,7 +174,7 @@ def _mode(description: Description, name: str) -> Mode:
     text = next(m for m in description.modes if m.name == name)
     held = sum(side == 0 for side in text.sides.values())
     rank = len(description.states) - held if text.rank is None else text.rank
-    return Mode(name, rank, held > 0)
+    return Mode(name, rank, held > 0, text.derived)
 
 
 # ------------------------------------------------------------------------------ constraints

@@ -185,7 +185,8 @@ def _modes(
                 (*address, "rank"),
                 f"'rank' is a whole number from 0 to {len(states)}, got {rank}",
             )
-        found.append(ModeText(name, tuple(field[state] for state in states), sides, rank))
+        rates = tuple(field[state] for state in states)
+        found.append(ModeText(name, rates, sides, rank, bool(entry.get("derived"))))
     if not found:
         example = ", ".join(f"{name}: -" for name in known)
         raise EntryError(

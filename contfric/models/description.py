@@ -34,6 +34,7 @@ class ModeText:
     field: tuple[str, ...]
     sides: Mapping[str, int]
     rank: int | None = None
+    derived: bool = False
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,8 @@ class Description:
             "in": dict(mode.sides),
             "field": dict(zip(self.states, mode.field, strict=True)),
         }
-        return found if mode.rank is None else {**found, "rank": mode.rank}
+        said = {"rank": mode.rank, "derived": mode.derived or None}
+        return {**found, **{key: value for key, value in said.items() if value is not None}}
 
     @cached_property
     def text(self) -> str:
@@ -191,7 +193,10 @@ class Description:
     def motion(self) -> str:
         """The same of what motion depends on: what only names, explains or measures is left out."""
         parameters = tuple(replace(p, meaning="") for p in self.parameters)
-        kept = replace(self, name="model", title="", references=(), parameters=parameters)
+        modes = tuple(replace(mode, derived=False) for mode in self.modes)
+        kept = replace(
+            self, name="model", title="", references=(), parameters=parameters, modes=modes
+        )
         return replace(kept, max_step=None, quantities=(), laws=(), units=(), origins=()).text
 
     @cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,11 +77,7 @@ def _read(path: Path) -> Model:
 
 def _in_folder(folder: Path) -> dict[str, Path]:
     """Return the models of a folder: the stems of its YAML files."""
-    return {p.stem: p for p in _files(folder)}
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    yield from sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES)
+    return {p.stem: p for p in sorted(folder.iterdir()) if p.suffix in SUFFIXES}
 
 
 def _loaded(entry: EntryPoint) -> Any:

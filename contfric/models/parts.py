@@ -67,12 +67,14 @@ class Mode:
     """One smooth vector field.
 
     ``rank`` is the number of independent directions that survive it (a stick keeps one of two:
-    one multiplier becomes exactly zero); ``sliding`` says that motion stays on a surface.
+    one multiplier becomes exactly zero); ``sliding`` says that motion stays on a surface; ``derived``
+    that nobody wrote the mode: it follows from the fields on both sides of its surface.
     """
 
     name: str
     rank: int
     sliding: bool = False
+    derived: bool = False
 
 
 @dataclass(frozen=True)

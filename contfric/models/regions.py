@@ -91,7 +91,8 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
     """Return the domains of all modes, with the names that were given."""
     places: dict[str, set[tuple[int, ...]]] = {}
     found: list[Domain] = []
-    order, led = [s.name for s in surfaces], _led(description)
+    order = [s.name for s in surfaces]
+    led = {lead.mode for leads in description.leads.values() for lead in leads}
     by_mode = {mode.name: mode.sides for mode in description.modes}
     settled = {
         lift: by_mode[own.mode][lift] for own in description.chatters for lift, _ in own.ways
@@ -115,11 +116,6 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
                 name += f"{',' if ':' in name else ':'}{hidden}-"
             found.append(Domain(name, mode.name, {n: sides[n] for n in order}, name))
     return _renamed(found, description.domains)
-
-
-def _led(description: Description) -> set[str]:
-    """Return the modes that resets lead into."""
-    return {lead.mode for leads in description.leads.values() for lead in leads}
 
 
 def _impossible(mode: ModeText, surfaces: list[Surface]) -> str:

@@ -98,6 +98,7 @@ class Mode(SchemaPart):
     field: Rates = LEFT_OUT
     sliding: Flag = None
     rank: int = said("a whole number from 0 to that of the states", default=None, ge=0)
+    derived: Flag = None
 
 
 class Domain(SchemaPart):

@@ -142,7 +142,7 @@ def solve_orbit(
         system = build_system(model, itinerary, signature.periods)
     nearest: Orbit | None = None
     for orbit in _solved_starts(system, vector, seed, progress or _nothing):
-        if orbit.converged and orbit.admissible and _is_wanted(orbit, signature):
+        if orbit.converged and orbit.admissible and signature.symmetric in (None, orbit.symmetric):
             return orbit
         if nearest is None or (orbit.converged, -orbit.residual) > (
             nearest.converged,
@@ -150,10 +150,6 @@ def solve_orbit(
         ):
             nearest = orbit
     raise ConvergenceError(_explain(signature, model.mapping(vector), nearest), nearest)
-
-
-def _is_wanted(orbit: Orbit, signature: Signature) -> bool:
-    return signature.symmetric is None or signature.symmetric == orbit.symmetric
 
 
 def _explain(signature: Signature, params: Mapping[str, float], nearest: Orbit | None) -> str:

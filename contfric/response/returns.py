@@ -248,7 +248,7 @@ def horseshoe_of(releases: ReleaseMap, most: int) -> Horseshoe:
     """Return what is proved of a release map; see :meth:`contfric.response.returns.ReleaseMap.horseshoe`."""
     need_flint()
     from contfric.certify.horseshoe import Sampled, find_horseshoe
-    from contfric.certify.returns import Release
+    from contfric.certify.releases.returns import Release
     from contfric.response.ways_out_of_rest import release_of
 
     model = releases.model

@@ -235,11 +235,7 @@ def _read(path: Path) -> Arrays:
     except OSError as error:
         raise ResultFileError(f"cannot read {path}: {error.strerror or error}") from None
     except Exception as error:  # the readers of zip and npy raise a dozen kinds on damaged bytes
-        raise ResultFileError(_damaged(path, _told(error))) from None
-
-
-def _told(error: Exception) -> str:
-    return f"{type(error).__name__}: {error}"
+        raise ResultFileError(_damaged(path, f"{type(error).__name__}: {error}")) from None
 
 
 def _damaged(path: Path, what: str) -> str:

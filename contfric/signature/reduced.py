@@ -159,7 +159,8 @@ def _key(pair: ReducedPair, model: Model) -> tuple[int, int]:
 def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     """Fuse the segments; the first piece starts at the first joint that does not fuse."""
     model = signature.model
-    pairs = zip(signature.canonical, _canonical_surfaces(signature), strict=True)
+    canonical = Signature(model, signature.canonical, signature.periods)
+    pairs = zip(signature.canonical, canonical.surfaces, strict=True)
     names, surfaces = zip(*(pair for pair in pairs if not is_impact(pair[0])), strict=True)
     modes = [mode_of(model, names, i) for i in range(len(names))]
     count = len(names)
@@ -185,8 +186,3 @@ def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
         )
         for start, end in pairwise(starts)
     )
-
-
-def _canonical_surfaces(signature: Signature) -> tuple[str, ...]:
-    canonical = Signature(signature.model, signature.canonical, signature.periods)
-    return canonical.surfaces

@@ -12,19 +12,19 @@ from flint import arb, arb_mat, ctx
 from mpmath import mp, mpf
 
 import contfric as cf
-from contfric.certify.chain import Chain, block_exponential, segments_of
-from contfric.certify.circle import no_pair
-from contfric.certify.events import _resonates
-from contfric.certify.extended import (
+from contfric.certify.enclosures.krawczyk import Equations, enclosed, krawczyk
+from contfric.certify.equations.chain import Chain, block_exponential, segments_of
+from contfric.certify.equations.extended import (
     EventCondition,
     at_joint,
     touched_within,
     with_multiplier,
     with_pair,
 )
-from contfric.certify.krawczyk import Equations, enclosed, krawczyk
+from contfric.certify.events import _resonates
 from contfric.certify.orbit import certify_orbit
-from contfric.certify.splitting import along
+from contfric.certify.tubes.circle import no_pair
+from contfric.certify.tubes.splitting import along
 from contfric.certify.verdict import Verdict
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.models.balls.build import ball_model

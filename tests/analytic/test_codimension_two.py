@@ -7,7 +7,7 @@ import pytest
 
 import contfric as cf
 from contfric.continuation.points import Settings
-from contfric.continuation.switching import leave_along, null_direction
+from contfric.continuation.singular_points.switching import leave_along, null_direction
 from contfric.curves.leaving import leaving
 from contfric.curves.problem import problem_of
 from contfric.curves.ranges import box_of

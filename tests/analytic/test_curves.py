@@ -9,7 +9,7 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.linear import pencil_of_turn
-from contfric.continuation.switching import leave_along, null_direction
+from contfric.continuation.singular_points.switching import leave_along, null_direction
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss
 

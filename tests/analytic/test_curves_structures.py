@@ -19,7 +19,7 @@ from scipy.optimize import brentq, fsolve
 
 import contfric as cf
 from contfric.continuation.points import PointRows, Settings
-from contfric.continuation.switching import leave_along, null_direction
+from contfric.continuation.singular_points.switching import leave_along, null_direction
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.trace import continue_bifurcation
 from tests.curve_check import miss

@@ -14,8 +14,9 @@ from scipy.integrate import solve_ivp
 import contfric as cf
 from contfric.bvp.system import build_system
 from contfric.continuation.half_branch import first_point
+from contfric.continuation.locating.smooth import smooth_events
 from contfric.continuation.points import settings_of
-from contfric.continuation.smooth import smooth_events
+from contfric.continuation.step import Step
 from contfric.continuation.trace import trace_side
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
@@ -260,7 +261,7 @@ def test_a_step_to_another_sheet_that_is_solved_everywhere_is_taken_back(model):
         arc += 1.16e-3
     before, after = ends
     assert before.mu[0].real < -1000.0 and after.mu[0].real > 10.0
-    found = smooth_events(orbit, before, after, settings, after)
+    found = smooth_events(Step(orbit, before, after, after, settings))
     assert [point.lost for _, point in found] == [True]
 
 

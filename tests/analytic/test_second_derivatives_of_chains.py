@@ -10,7 +10,7 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.system import build_system
-from contfric.continuation.crossing import _ChainProblem
+from contfric.continuation.singular_points.crossing import _ChainProblem
 
 MODEL = cf.load_model("coulomb")
 OMEGA, S, S0, ZETA, WIDTH = 0.5, 0.32, 0.4, 0.07, 0.3

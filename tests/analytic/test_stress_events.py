@@ -16,7 +16,7 @@ from mpmath import mp, mpf
 from report import Tally
 
 import contfric as cf
-from contfric.continuation import accuracy
+from contfric.continuation.accuracy import rounding
 from contfric.events.bifurcation import ACCURACY
 
 DIAGRAMS = {
@@ -38,7 +38,7 @@ def found(parameter: str) -> tuple[cf.Bifurcation, ...]:
 @pytest.mark.parametrize("parameter", DIAGRAMS)
 def test_accuracy_is_a_bound_of_the_error(parameter: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the least value that is claimed: no smaller than the error, and not empty."""
-    monkeypatch.setattr(accuracy, "LEAST", 0.0)
+    monkeypatch.setattr(rounding, "LEAST", 0.0)
     params, (low, high) = DIAGRAMS[parameter]
     orbit = cf.find_orbit("coulomb", params)
     diagram = cf.explore(orbit, parameter, (low, high), bridges=False)

@@ -62,6 +62,28 @@ def test_a_mode_that_no_solution_comes_into(tmp_path: Path) -> None:
     assert Topic.REACHED not in near
 
 
+#: Rest is held for almost no load: solutions pass v = 0.
+HARDLY_HELD = """
+name: held
+states: [x, v]
+parameters: {{w: 0.9, a: 2.0, S: 0.2, H: 1e-7}}
+period: 2*pi/w
+observables: {{pull: a*cos(w*t) - x}}
+surfaces: {{v: {{observable: v}}, up: {{observable: pull, level: H}}, down: {{observable: pull, level: -H}}}}
+modes:
+  up: {{in: {{v: +}}, field: {{x: v, v: pull - S - 0.1*v}}}}
+  down: {{in: {{v: -}}, field: {{x: v, v: pull + S - 0.1*v}}}}
+  {rest}: {{in: {{v: 0, up: -, down: +}}, field: {{x: 0, v: 0}}}}
+"""
+
+
+@pytest.mark.parametrize("rest", ["rest", "slide"])
+def test_a_mode_of_rest_that_no_solution_comes_into(tmp_path: Path, rest: str) -> None:
+    """Whatever its name is: only modes that contfric derives are not spoken of."""
+    found = said(tmp_path, HARDLY_HELD.format(rest=rest))
+    assert any(f"simulations came into mode '{rest}'" in m for m in found[Topic.REACHED])
+
+
 TWO_SIDES = """
 name: sides
 states: [x, v]

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.certify import tube_file
 from contfric.certify.branch import certify_branch
 from contfric.certify.files import verify
-from contfric.certify.tube_file import tubes_of
+from contfric.certify.tubes import tube_file
+from contfric.certify.tubes.tube_file import tubes_of
 from contfric.verify.file import check_text
 
 PARAMS = {"Omega": 0.54, "S": 0.32, "S0": 0.4}

@@ -11,9 +11,9 @@ import restarts
 
 import contfric as cf
 from contfric.bvp.linear import assembled
-from contfric.continuation.arms import arms_at, passages, turning_passages
 from contfric.continuation.points import settings_of
-from contfric.continuation.vertices import undoubled_part
+from contfric.continuation.singular_points.arms import arms_at, passages, turning_passages
+from contfric.continuation.singular_points.vertices import undoubled_part
 from contfric.events.bifurcation import Kind
 from contfric.events.sequences import count, lengths
 from contfric.orbit.distance import cyclic_apart, farthest_apart

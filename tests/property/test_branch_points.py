@@ -11,11 +11,11 @@ import pytest
 import contfric as cf
 from contfric.atlas.crossings import whole_branch
 from contfric.atlas.matching import on_branch
-from contfric.continuation.crossing import LOCATED, _ChainProblem, crossing_near
+from contfric.continuation.ends.at_vertices import stalled_at
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import MOST_POINTS, settings_of
-from contfric.continuation.switching import leave_along
-from contfric.continuation.vertex_ends import stalled_at
+from contfric.continuation.singular_points.crossing import LOCATED, _ChainProblem, crossing_near
+from contfric.continuation.singular_points.switching import leave_along
 from contfric.events.bifurcation import EndReason
 
 MODEL = Path(__file__).parents[1] / "models" / "crossing.yaml"

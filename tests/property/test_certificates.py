@@ -12,11 +12,11 @@ from flint import arb, arb_mat, ctx
 
 import contfric as cf
 from contfric.certify import limit
-from contfric.certify.multipliers import stability, turn_multipliers
+from contfric.certify.equations.multipliers import stability, turn_multipliers
+from contfric.certify.equations.zeros import in_span
+from contfric.certify.inequalities.sign import Path, positive, touched
 from contfric.certify.orbit import certify_orbit, with_inequalities
-from contfric.certify.sign import Path, positive, touched
 from contfric.certify.verdict import Verdict
-from contfric.certify.zeros import in_span
 from contfric.errors import ContfricError
 from contfric.orbit.orbit import Orbit
 

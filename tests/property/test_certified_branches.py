@@ -15,13 +15,13 @@ import contfric as cf
 from contfric.base.arrays import FloatArray
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.system import build_system
-from contfric.certify import locating, tracing
 from contfric.certify.branch import certify_branch, cover
-from contfric.certify.chain import Chain, segments_of
-from contfric.certify.inequalities import RATE
-from contfric.certify.strand import Strand, in_phases
-from contfric.certify.tracing import Tracer
-from contfric.certify.tube import Box, box_between, solved
+from contfric.certify.equations.chain import Chain, segments_of
+from contfric.certify.inequalities.along_segments import RATE
+from contfric.certify.tubes import locating, tracing
+from contfric.certify.tubes.strand import Strand, in_phases
+from contfric.certify.tubes.tracing import Tracer
+from contfric.certify.tubes.tube import Box, box_between, solved
 from contfric.events.bifurcation import End, EndReason
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel

@@ -7,9 +7,9 @@ import pytest
 from flint import arb
 
 import contfric as cf
-from contfric.certify import census_search
-from contfric.certify.following import Follower, Returned
-from contfric.certify.stretch import LineInS, UndecidedError
+from contfric.certify.releases import census_search
+from contfric.certify.releases.following import Follower, Returned
+from contfric.certify.releases.stretch import LineInS, UndecidedError
 from contfric.errors import ParameterError
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working

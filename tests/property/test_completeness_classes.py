@@ -18,12 +18,12 @@ import contfric as cf
 from contfric.atlas.balance import _solved_at
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.faults import fault_of
-from contfric.continuation.arms import arms_at
-from contfric.continuation.continuum import is_continuum
+from contfric.continuation.accuracy.moved_by_errors import duration_error
+from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.located_event import ROUGH
-from contfric.continuation.moved_by_errors import duration_error
-from contfric.continuation.openings import with_openings
 from contfric.continuation.points import settings_of
+from contfric.continuation.singular_points.arms import arms_at
+from contfric.continuation.singular_points.openings import with_openings
 from contfric.events.doubling_point import _LOCATED, Line, opening
 from contfric.orbit.index import opening_sign
 
@@ -342,8 +342,10 @@ def test_where_a_hold_turns_by_itself_its_fold_is_no_doubling(
     orbit = cf.find_orbit("coulomb", {**found.params, "zeta": -0.025}, longest=1000)
     explored = cf.explore(orbit, "zeta", (-0.0254, -0.0249), max_periods=4)
     bridge = next(b for b in explored.branches if len(b.system.holds) == 1)
-    monkeypatch.setattr("contfric.continuation.openings.opening_sign", sign)
-    monkeypatch.setattr("contfric.continuation.openings.refined_opening", lambda *_: None)
+    monkeypatch.setattr("contfric.continuation.singular_points.openings.opening_sign", sign)
+    monkeypatch.setattr(
+        "contfric.continuation.singular_points.openings.refined_opening", lambda *_: None
+    )
     passed = 0
     for step in 0.01 * 10.0 ** np.random.default_rng(3).uniform(-1.0, 0.5, 6):
         middle = bridge[len(bridge) // 2]

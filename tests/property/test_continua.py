@@ -11,7 +11,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.verification import differences
-from contfric.continuation.continuum import in_continuum, is_continuum
+from contfric.continuation.families.continuum import in_continuum, is_continuum
 
 #: Scenes with no sticks: a large excitation against friction, drawn at random.
 SEEDS = range(6)

@@ -113,7 +113,7 @@ def test_an_event_that_cannot_be_located_is_said(
     column: int, kind: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The sign change is known, the place is not: reported at the point before, and not followed."""
-    from contfric.continuation import smooth
+    from contfric.continuation.locating import smooth
     from contfric.continuation.points import EXTRA
 
     trial = smooth.locate_change

@@ -15,14 +15,20 @@ from contfric.atlas.follow import _through
 from contfric.atlas.matching import same_kind, telling_kind
 from contfric.base.tally import tally
 from contfric.bvp.system import Margin
-from contfric.continuation import smooth
-from contfric.continuation.folds import _is_idle
+from contfric.continuation.ends.at_vertices import left_at
 from contfric.continuation.half_branch import first_point
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import Point, settings_of
-from contfric.continuation.switching import LEAVE, leave_along, null_direction, overshoots
+from contfric.continuation.singular_points.folds import _is_idle
+from contfric.continuation.singular_points.switching import (
+    LEAVE,
+    leave_along,
+    null_direction,
+    overshoots,
+)
+from contfric.continuation.singular_points.vertices import passed_vertex
+from contfric.continuation.step import Step
 from contfric.continuation.trace import trace_side
-from contfric.continuation.vertex_ends import left_at
-from contfric.continuation.vertices import passed_vertex
 from contfric.events import sliding_kinds as kinds
 from contfric.events.doubling_point import moved, opening, refined_opening
 from contfric.simulation.simulate import tables
@@ -101,10 +107,11 @@ def test_a_parameter_that_turns_is_a_fold(
     orbit = asymmetric()[0]
     settings = settings_of(orbit, "Omega", (0.4, 0.6), None, True, 100)
     here, far = point(0.5, multiplier), 2.0
-    sides = (point(0.5 + before, far), point(0.5 + after, far))
-    assert _is_idle(orbit, sides[0], here, sides[1], settings) is idle
+    first, last = point(0.5 + before, far), point(0.5 + after, far)
+    step = Step(orbit, first, last, last, settings)
+    assert _is_idle(step, here) is idle
     without = replace(settings, stability=False)  # nothing is dropped that nothing speaks against
-    assert not _is_idle(orbit, sides[0], here, sides[1], without)
+    assert not _is_idle(replace(step, settings=without), here)
 
 
 def test_a_vertex_left_behind_is_found_between_the_two_orbits() -> None:

@@ -7,6 +7,8 @@ is made to fail between: nothing is reported. One that turns before is.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation import events_of_step as resolve
-from contfric.continuation import smooth
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import LARGEST_STEP
 from contfric.events.bifurcation import Kind
 
@@ -33,26 +35,27 @@ def _last_steps(monkeypatch, seed):
     """Return what the last steps of bridges are asked with that end where their parameter stands."""
     asked = []
 
-    def smooth_events(orbit, before, after, settings, beyond):
-        if orbit.system.holds and beyond is not after and before.arc < beyond.arc:
-            asked.append((orbit, before, after, settings, beyond))
-        return smooth.smooth_events(orbit, before, after, settings, beyond)
+    def smooth_events(step):
+        ends = step.beyond is not step.after and step.before.arc < step.beyond.arc
+        if step.orbit.system.holds and ends:
+            asked.append(step)
+        return smooth.smooth_events(step)
 
     with monkeypatch.context() as patched:
         patched.setattr(resolve, "smooth_events", smooth_events)
         cf.explore(cf.find_orbit("coulomb", _scene(seed)), "h", RANGE, max_periods=2)
-    return [step for step in asked if abs(step[4].slope) < 1e-8 and abs(step[1].slope) > 1e-5]
+    return [s for s in asked if abs(s.beyond.slope) < 1e-8 and abs(s.before.slope) > 1e-5]
 
 
 def _folds(step, slope, turns=False):
-    orbit, before, after, settings, event = step
+    before, event = step.before, step.beyond
     base = len(event.tests) - smooth.EXTRA
     direction, tests, w = event.direction.copy(), event.tests.copy(), event.w.copy()
     direction[0] = tests[base] = slope
     if turns:  # the parameter as well
         w[0] = before.value + 0.5 * (before.slope + slope) * (event.arc - before.arc)
     event = altered(event, direction=direction, tests=tests, w=w)
-    found = smooth.smooth_events(orbit, before, after, settings, event)
+    found = smooth.smooth_events(replace(step, beyond=event))
     return [bifurcation for bifurcation, _ in found if bifurcation.kind is Kind.SN]
 
 
@@ -63,10 +66,11 @@ def test_no_fold_at_an_event_at_which_the_parameter_stands(monkeypatch, seed):
     monkeypatch.setattr(smooth, "locate_change", lambda *_: None)
     rng = np.random.default_rng(seed)
     for step in steps:
-        rounding = -np.sign(step[1].slope) * 10.0 ** rng.uniform(-12.0, -8.0)
+        slope = step.before.slope
+        rounding = -np.sign(slope) * 10.0 ** rng.uniform(-12.0, -8.0)
         assert not _folds(step, rounding)
-        if abs(step[1].slope) * (step[4].arc - step[1].arc) > 1e-6:  # else it does not turn visibly
-            assert _folds(step, -0.9 * step[1].slope, turns=True)
+        if abs(slope) * (step.beyond.arc - step.before.arc) > 1e-6:  # else it does not turn visibly
+            assert _folds(step, -0.9 * slope, turns=True)
 
 
 @pytest.mark.parametrize("case", [None, 0])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import contfric as cf
 from contfric.bvp.linear import assembled, jacobian_blocks, tangent_of
-from contfric.continuation.vertices import passed_vertex
+from contfric.continuation.singular_points.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.events.unit import form_of, pieces, unit_of
 from contfric.models import load_model

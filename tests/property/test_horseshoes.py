@@ -8,8 +8,8 @@ from flint import arb, ctx
 
 import contfric as cf
 from contfric.certify.horseshoe import Horseshoe
-from contfric.certify.returns import Release, ReturnMap
-from contfric.certify.stretch import LineInS, UndecidedError
+from contfric.certify.releases.returns import Release, ReturnMap
+from contfric.certify.releases.stretch import LineInS, UndecidedError
 from contfric.response.returns import ReleaseMap
 
 PARAMS = {"Omega": 0.396, "S": 0.082, "S0": 0.4}

@@ -9,9 +9,9 @@ import pytest
 from flint import arb, arb_mat
 
 import contfric as cf
-from contfric.certify.chain import Chain, segments_of
-from contfric.certify.circle import no_pair
-from contfric.certify.monodromy import monodromy
+from contfric.certify.equations.chain import Chain, segments_of
+from contfric.certify.equations.monodromy import monodromy
+from contfric.certify.tubes.circle import no_pair
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.orbit import Orbit

@@ -12,9 +12,9 @@ import pytest
 from flint import arb, arb_mat
 
 import contfric as cf
-from contfric.certify import sign
-from contfric.certify.chain import segments_of
-from contfric.certify.closing import is_symmetry
+from contfric.certify.equations.chain import segments_of
+from contfric.certify.equations.closing import is_symmetry
+from contfric.certify.inequalities import sign
 from contfric.certify.verdict import Verdict
 from contfric.models.balls.build import ball_model
 

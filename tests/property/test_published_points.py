@@ -16,8 +16,8 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.system import EventFunction, Margin
-from contfric.continuation.accuracy import off_circle
-from contfric.continuation.vertices import symmetric_part
+from contfric.continuation.accuracy.rounding import off_circle
+from contfric.continuation.singular_points.vertices import symmetric_part
 from contfric.orbit.solve import refine
 from contfric.signature.holds import TOUCH
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,10 +11,10 @@ import pytest
 import contfric as cf
 from contfric.atlas.verification import STEP, differences
 from contfric.base.attributes import altered
-from contfric.continuation import smooth
-from contfric.continuation.folds import fold_at
 from contfric.continuation.half_branch import point_before
+from contfric.continuation.locating import smooth
 from contfric.continuation.points import LARGEST_STEP
+from contfric.continuation.singular_points.folds import fold_at
 from contfric.events.bifurcation import Kind
 from contfric.events.incident import Name, kinds_between
 
@@ -36,10 +37,10 @@ def _bridge_folds(monkeypatch, params, parameter, bounds):
     """Return what bridges that hardly turn are asked at their folds, with the located points."""
     asked = []
 
-    def located(orbit, before, after, beyond, point, settings):
-        if orbit.system.holds:
-            asked.append((orbit, point, settings))
-        return fold_at(orbit, before, after, beyond, point, settings)
+    def located(step, point):
+        if step.orbit.system.holds:
+            asked.append((step, point))
+        return fold_at(step, point)
 
     with monkeypatch.context() as patched:
         patched.setattr(smooth, "fold_at", located)
@@ -53,18 +54,22 @@ def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
     params = {**FOLD, "S": 0.0810880207884525}
     asked = _bridge_folds(monkeypatch, params, "S", (0.0720337655, 0.0903702620))
     assert asked
-    for orbit, point, settings in asked:
-        here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
+    for step, point in asked:
+        here = step.orbit_at(point)
         for _ in range(8):
             near, far = 10.0 ** rng.uniform(-7.0, -2.0), 10.0 ** rng.uniform(-4.0, -2.0)
             near, far = (near, far) if rng.random() < 0.5 else (far, near)
-            before, after = (point_before(here, point, back, settings) for back in (near, -far))
-            found = fold_at(orbit, before, after, after, point, settings)
+            before, after = (
+                point_before(here, point, back, step.settings) for back in (near, -far)
+            )
+            found = fold_at(replace(step, before=before, after=after, beyond=after), point)
             assert [event.kind for event, _ in found] == [Kind.SN]
         # a parameter that goes on in the same direction does not turn
         rising = altered(after, w=2.0 * point.w - after.w)
-        monkeypatch.setattr("contfric.continuation.folds._farther", lambda _o, _p, sides, _s: sides)
-        assert not fold_at(orbit, before, rising, rising, point, settings)
+        monkeypatch.setattr(
+            "contfric.continuation.singular_points.folds._farther", lambda _o, _p, sides, _s: sides
+        )
+        assert not fold_at(replace(step, before=before, after=rising, beyond=rising), point)
         monkeypatch.undo()
 
 

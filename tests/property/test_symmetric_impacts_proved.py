@@ -11,8 +11,8 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.system import build_system
-from contfric.certify.chain import segments_of
-from contfric.certify.closing import is_symmetry, keeps
+from contfric.certify.equations.chain import segments_of
+from contfric.certify.equations.closing import is_symmetry, keeps
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import working
 

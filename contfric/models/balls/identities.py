@@ -60,7 +60,7 @@ def mirrored(affine: AffineModel, closure: Closure, modes: Pairs, surfaces: Sign
     """Tell whether a symmetry of half a period maps fields, surfaces and resets to those of the images.
 
     In symbols: ``M' D = K M``, ``g' D = -g`` or g, and ``R' D = K R``, D = diag(K, 1, (-1)^n_k), as in
-    :mod:`contfric.certify.closing`.
+    :mod:`contfric.certify.equations.closing`.
     """
     n, turns = affine.states, affine.turns
     k = sympy.Matrix(n, n, [sympy.Rational(c) for row in closure for c in row])

@@ -104,8 +104,8 @@ def _unvisited(probe: Probe) -> set[str]:
     visited = {m.last[3] for m in motions if m.last[3] and len(m.modes)}
     visited |= {model.modes[k].name for motion in motions for k in np.unique(motion.modes[1:])}
     joined = {model.whole_mode(name) for name in visited}
-    derived = {m.name for m in model.modes if m.sliding and m.name.startswith("slide")}
-    return {m.name for m in model.modes if model.whole_mode(m.name) not in joined} - derived
+    unvisited = (m for m in model.modes if model.whole_mode(m.name) not in joined)
+    return {m.name for m in unvisited if not m.derived}
 
 
 @lru_cache(maxsize=1)  # the same simulations for every fault of a model

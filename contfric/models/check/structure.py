@@ -65,8 +65,8 @@ def _is_flat(probe: Probe, surface: str, t: float, y: FloatArray) -> bool:
 
 def _ends_derived(model: Model, surface: Surface) -> bool:
     """Tell whether a surface ends a derived sliding mode: nobody wrote it, and one end may be all."""
-    mode = surface.name[:-1]
-    return mode.startswith("slide") and mode in model.mode_by_name
+    mode = model.mode_by_name.get(surface.name[:-1])
+    return mode is not None and mode.derived
 
 
 def check_transitions(report: ModelReport, probe: Probe) -> None:

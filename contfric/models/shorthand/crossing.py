@@ -191,6 +191,7 @@ def crossing_parts(
         found["modes"][f"slide_{on}_{beside}{'_above' if s > 0 else '_below'}"] = {
             "in": {**crossing.others, on: 0, beside: _MARK[s], **limits.alone(i, s)},
             "field": crossing.field(both, (i,)),
+            "derived": True,
         }
         found["departures"] += [
             {
@@ -212,6 +213,7 @@ def crossing_parts(
     found["modes"][f"slide_{a}_{b}"] = {
         "in": {**crossing.others, a: 0, b: 0, **limits.corner(0), **limits.corner(1)},
         "field": crossing.field(s_both, (0, 1)),
+        "derived": True,
     }
     found["departures"] += [
         {

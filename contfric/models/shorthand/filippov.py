@@ -250,6 +250,7 @@ def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> N
     found["modes"][own] = {
         "in": sides,
         "field": dict(zip(sliding.states, map(sliding.text, sliding.field), strict=True)),
+        "derived": True,
     }
 
 

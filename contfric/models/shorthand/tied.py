@@ -85,7 +85,8 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
         raise ParameterError(
             f"model '{model.name}' is not declared by formulas: its parameters cannot be tied"
         )
-    data, name = from_text(source.definition).data(), _named(model.name, ties)
+    data = from_text(source.definition).data()
+    name = f"{model.name} with {', '.join(f'{k} = {v}' for k, v in ties.items())}"
     parameters = {**data["parameters"], **{name: {_TIE: text} for name, text in ties.items()}}
     try:
         return from_data({**data, "name": name, "parameters": parameters})
@@ -123,10 +124,6 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
                 f"{{tie: {text}}}: '{other}' {'is tied itself' if other in ties else why}",
             )
     return _substituted(data, ties)
-
-
-def _named(name: str, ties: Mapping[str, str]) -> str:
-    return f"{name} with {', '.join(f'{k} = {v}' for k, v in ties.items())}"
 
 
 def _substituted(data: dict[str, Any], ties: Mapping[str, str]) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Signs that are proved over whole segments."""

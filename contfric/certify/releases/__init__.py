@@ -1,0 +1,1 @@
+"""All solutions that are released in an interval of phases."""

@@ -1,0 +1,1 @@
+"""A branch in overlapping boxes, from event to event."""

@@ -1,0 +1,223 @@
+"""The orbit of a proved event as a zero of the chain of a branch that ends or passes there.
+
+An event is proved on the shortest problem of its orbit: without segments that have vanished there, on its
+half if it is symmetric (:mod:`contfric.certify.equations.locating`). A branch has another chain. Where each
+of its joints is one of the event's orbit, and each of its segments leads from one of these joints to the next
+one in the same mode, or has no length there and its exit surface is met anyway, the event's orbit solves the
+equations of the branch exactly; not only up to the width of balls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+
+from flint import arb, arb_mat
+
+from contfric.bvp.system import System
+from contfric.certify.equations.chain import Chain, Segments, segments_of
+from contfric.certify.equations.closing import closing_of
+from contfric.certify.equations.extended import Builder
+from contfric.certify.equations.kept import Kept
+from contfric.certify.equations.zeros import at_start, closed, in_span, zeros_at_joints
+from contfric.certify.events import EventCertificate
+from contfric.certify.inequalities.along_segments import rows_met
+from contfric.models.balls.build import ball_model
+from contfric.models.balls.model import BallModel
+from contfric.models.balls.numbers import Vector, column, numbers
+
+#: A joint of the branch is taken for that of the event within this distance.
+_NEAR = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class _Cycle:
+    """The event's whole orbit: joints, modes, resets before them, and what vanishes at each joint."""
+
+    joints: list[Vector]
+    modes: list[str]
+    resets: list[str]
+    vanishing: list[list[Vector]]
+    turn: arb
+    periods: int
+
+    def dated(self, autonomous: bool, first: arb) -> Iterator[_Cycle]:
+        """Yield the cycle; without excitation, with each of its joints in turn at a branch's first time."""
+        if not autonomous:
+            yield self
+            return
+        for own in self.joints:
+            later = (first - own[0]).mid()
+            yield replace(self, joints=[[z[0] + later, *z[1:]] for z in self.joints])
+
+
+def as_zero_of(
+    proof: EventCertificate, system: System, segments: Segments, build: Builder, near: Vector
+) -> Vector | None:
+    """Return balls that hold the event's orbit as a solution (z, p) of a branch's chain; None if it is not.
+
+    Parameters
+    ----------
+    build : the model with the phase for its time
+    near : approximate solution of the chain at the event
+    """
+    if proof.location is None or proof.value is None:
+        return None
+    own = proof.location.orbit.system
+    if own.model is not system.model or (system.half and not own.half):
+        return None
+    if system.periods % own.periods:
+        return None
+    if len(segments.kept) != len(proof.kept) or not all(map(Kept.same, segments.kept, proof.kept)):
+        return None
+    model = build(proof.value)
+    for touched in (False, True)[: 1 + _is_within(proof)]:
+        cycle = _cycle(proof, model, touched)
+        for dated in [] if cycle is None else cycle.dated(system.model.autonomous, near[0]):
+            found = _on(dated, system, segments, model, near)
+            if found is not None:
+                return [*found, proof.value]
+    return None
+
+
+def _is_within(proof: EventCertificate) -> bool:
+    """Tell whether the event is a touch within a segment."""
+    assert proof.location is not None
+    condition = proof.location.condition
+    return condition is not None and condition.within
+
+
+def _on(
+    cycle: _Cycle, system: System, segments: Segments, model: BallModel, near: Vector
+) -> Vector | None:
+    """Return the joints of a chain that the event's orbit solves, next to some; None if it does not."""
+    m, count = segments.states + 1, segments.count
+    found: list[tuple[int, int]] = []
+    for i in range(count):
+        at = _matched(cycle, near[i * m : (i + 1) * m])
+        if at is None:
+            return None
+        found.append(at)
+    found.append(_closed(found[0], cycle, system, near))
+    if not all(_leads(cycle, model, segments, i, *found[i : i + 2]) for i in range(count)):
+        return None
+    *joints, closed = (_moved(cycle, at) for at in found)
+    end = (
+        closed[0] if system.model.autonomous else arb(0)
+    )  # without excitation a cycle ends at time 0
+    return [c for time, *state in joints for c in (time - end, *state)]
+
+
+def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> _Cycle | None:
+    """Return the whole orbit of an event in phases; with a joint where it touches a surface, if asked for."""
+    location, event = proof.location, proof.event
+    assert location is not None
+    orbit = location.orbit
+    segments = segments_of(orbit.system)
+    m, half = segments.states + 1, orbit.system.half
+    closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
+    one = arb_mat([[arb(int(a == b)) for b in range(m - 1)] for a in range(m - 1)])
+    twice = closure * closure == one  # for certain
+    if not twice:
+        return None
+    autonomous = event.orbit.model.autonomous
+    timed = ball_model(event.orbit.model, event.params, proof.parameter, proof.value)
+    scale = arb(1) if autonomous else 2 * arb.pi() / timed.period
+    joints = [list(proof.zero[i * m : (i + 1) * m]) for i in range(segments.count)]
+    joints = [[joint[0] * scale, *joint[1:]] for joint in joints]
+    condition = location.condition
+    met = rows_met(condition, segments, model)
+    closing = closing_of(segments, model, half)
+    still = condition.segment if condition is not None and condition.before else -1
+    known = zeros_at_joints(segments, model, closing, met, still)
+    whole = segments_of(orbit.as_whole().system)
+    starts = range(0, whole.count, segments.count)  # of the turn, or of its half and the image
+    modes = [list(whole.modes[k : k + segments.count]) for k in starts]
+    resets = [list(whole.resets[k : k + segments.count]) for k in starts]
+    if still >= 0:  # both of its ends are one point
+        del joints[still], known[still]
+        for own in (*modes, *resets):
+            del own[still]
+    if touched and condition is not None:
+        i = condition.segment
+        after, mode = proof.zero[-2] * scale, segments.modes[i]
+        move = Chain(segments, model).move(i, [*joints, *joints[:1]])
+        end = numbers((move.field * after).exp() * move.start)
+        kept = at_start(segments, model, i, known[i])
+        kept = [row for row in kept if in_span(numbers(arb_mat([row]) * move.field), [])]
+        joints.insert(i + 1, [joints[i][0] + after, *end[: m - 1]])
+        row = model.rows[condition.surface]
+        if condition.departs:
+            row = model.rate(condition.surface, condition.departs)
+        rate = model.rate(condition.surface, mode)
+        if condition.departs:
+            rate = numbers(arb_mat([row]) * move.field)
+        known.insert(i + 1, [row, rate, *kept])
+        for own in modes:
+            own.insert(i + 1, own[i])
+        for own in resets:
+            own.insert(i + 1, "")
+    turn = -joints[0][0] if autonomous else arb(segments.turn) * 2 * arb.pi()
+    if half:
+        image = [[z[0] + turn, *numbers(closure * column(z[1:]))] for z in joints]
+        joints, known = (
+            [*joints, *image],
+            [
+                *known,
+                *([closed(r, closing, segments, model) for r in rows] for rows in known),
+            ],
+        )
+        turn = 2 * turn
+    all_modes, all_resets = list(chain.from_iterable(modes)), list(chain.from_iterable(resets))
+    return _Cycle(joints, all_modes, all_resets, known, turn, orbit.periods)
+
+
+def _matched(cycle: _Cycle, joint: Vector) -> tuple[int, int] | None:
+    """Return which joint of the orbit one of the branch is, and how many times the orbit later."""
+    for j, own in enumerate(cycle.joints):
+        later = round(float(((joint[0] - own[0]) / cycle.turn).mid()))
+        moved = _moved(cycle, (j, later))
+        if all(abs(float((a - b).mid())) < _NEAR for a, b in zip(joint, moved, strict=True)):
+            return j, later
+    return None
+
+
+def _moved(cycle: _Cycle, at: tuple[int, int]) -> Vector:
+    joint = cycle.joints[at[0]]
+    return [joint[0] + at[1] * cycle.turn, *joint[1:]]
+
+
+def _closed(first: tuple[int, int], cycle: _Cycle, system: System, near: Vector) -> tuple[int, int]:
+    """Return the joint that the closure of the branch leads to from its first one."""
+    j, later = first
+    if not system.half:
+        times = system.periods // cycle.periods
+        if system.model.autonomous:
+            times = round(float((-near[0] / cycle.turn).mid()))
+        return j, later + times
+    count = len(cycle.joints)
+    steps = j + count // 2
+    return steps % count, later + steps // count
+
+
+def _leads(
+    cycle: _Cycle,
+    model: BallModel,
+    segments: Segments,
+    i: int,
+    start: tuple[int, int],
+    end: tuple[int, int],
+) -> bool:
+    """Tell whether the orbit obeys the equations of segment i of the branch."""
+    j, later = start
+    following = ((j + 1) % len(cycle.joints), later + (j + 1) // len(cycle.joints))
+    own = (cycle.modes[j], cycle.resets[j]) == (segments.modes[i], segments.resets[i])
+    if not ((start == end and not segments.resets[i]) or (end == following and own)):
+        return False
+    pin = segments.pins[i]
+    if pin is None:
+        return in_span(model.rows[segments.exits[i]], cycle.vanishing[end[0]])
+    if isinstance(pin, str):
+        return in_span(model.rows[pin], cycle.vanishing[j])
+    return in_span(model.rate(pin[1], pin[0]), cycle.vanishing[j])

@@ -1,0 +1,1 @@
+"""How well an event is known: its parameter value, and the signs that are read near it."""

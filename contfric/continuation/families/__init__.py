@@ -1,0 +1,1 @@
+"""Continua: families of orbits at one value of the parameter."""

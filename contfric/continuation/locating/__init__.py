@@ -1,0 +1,1 @@
+"""Events between two points of a branch, located on it."""
