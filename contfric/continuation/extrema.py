@@ -114,7 +114,7 @@ class _ExtremumSearch:
         slopes : of the point before the step, both ends, and the point after it; nan without one
         """
         for share in _nearest(slopes):
-            middle = point_between(self._start(), step.before, step.after, self.settings, share)
+            middle = point_between(self.branch[0], step.before, step.after, self.settings, share)
             if middle is None:
                 continue
             measured = self.measured(middle)
@@ -130,14 +130,14 @@ class _ExtremumSearch:
         p, q = float(step.first.ahead[0]), float(step.last.ahead[0])
         if p * q < 0.0:
             ends = step.before, step.after
-            point = zero_between(self._start(), *ends, self.settings, self.slope)
+            point = zero_between(self.branch[0], *ends, self.settings, self.slope)
             if point is not None:
                 yield point, p > 0.0, abs(self.slope(point))
             return
         rise = step.last.value - step.first.value
         if halvings == 0 or p * rise >= 0.0 or abs(rise) < _ROUNDING * (1.0 + abs(step.last.value)):
             return
-        middle = point_between(self._start(), step.before, step.after, self.settings, 0.5)
+        middle = point_between(self.branch[0], step.before, step.after, self.settings, 0.5)
         if middle is None:
             return
         measured = self.measured(middle)
@@ -147,15 +147,6 @@ class _ExtremumSearch:
         yield from self.extrema(
             _MeasuredStep(middle, step.after, measured, step.last), halvings - 1
         )
-
-    def _start(self) -> Orbit:
-        return self.orbit_of(self.branch.joints[0], float(self.branch.values[0]))
-
-    def orbit_of(self, joints: FloatArray, value: float) -> Orbit:
-        """Return an orbit of the branch by its joints and the parameter."""
-        vector = self.branch.vector.copy()
-        vector[self.branch.model.index_of(self.branch.parameter)] = value
-        return Orbit(self.branch.system, joints, vector, 0.0)
 
 
 def _nearest(slopes: FloatArray) -> Iterator[float]:
@@ -174,9 +165,9 @@ def _nearest(slopes: FloatArray) -> Iterator[float]:
 def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
     """Return the extrema of a quantity along a branch; see :meth:`contfric.Branch.extrema`."""
     quantity = number_quantity(name, branch.model, "extrema")
-    search = _ExtremumSearch(branch, quantity, _settings(branch))
+    search = _ExtremumSearch(branch, quantity, settings_of(branch))
     found: list[Extremum] = []
-    points = list(_points(branch, search))
+    points = list(points_of(branch, search.settings))
     measured = [search.measured(point) for _, point in points]
     slopes = np.array([np.nan, *(float(m.ahead[0]) for m in measured), np.nan])
     for k in range(len(points) - 1):
@@ -211,19 +202,20 @@ def _flat_end(slopes: FloatArray) -> bool:
     return bool((np.isnan(before) and p < _ZERO * q) or (np.isnan(behind) and q < _ZERO * p))
 
 
-def _settings(branch: Branch) -> Settings:
+def settings_of(branch: Branch) -> Settings:
+    """Return settings with which points between those of a branch are solved."""
     low, high = float(branch.values.min()), float(branch.values.max())
     width = max(high - low, 1e-6 * (1.0 + abs(low)))
     return Settings(branch.parameter, low, high, "", "", width, stability=False)
 
 
-def _points(branch: Branch, search: _ExtremumSearch) -> Iterator[tuple[int, Point]]:
+def points_of(branch: Branch, settings: Settings) -> Iterator[tuple[int, Point]]:
     """Yield the points of a branch with their unit tangents, those that have one, and their indices."""
-    scale, count = search.settings.scale, branch.joints.shape[1]
+    scale, count = settings.scale, branch.joints.shape[1]
     active = branch.model.index_of(branch.parameter)
     arc, last = 0.0, None
     for k in range(len(branch)):
-        orbit = search.orbit_of(branch.joints[k], float(branch.values[k]))
+        orbit = branch[k]
         try:
             tangent, slope = tangent_of(branch.system, orbit.joints, orbit.vector, active)
         except np.linalg.LinAlgError:

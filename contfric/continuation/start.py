@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.bvp.linear import null_space
-from contfric.continuation.families.continuum import LEVEL, in_continuum
+from contfric.continuation.families.continuum import LEVEL, ONE, in_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import EXTRA, Point, Settings, next_to
 from contfric.continuation.singular_points.vertices import symmetrised
@@ -36,8 +36,12 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
         If the orbit has no unique continuation.
     """
     orbit = _as_symmetric(canonical(orbit).as_half())
-    start = first_point(orbit, settings) or _along_null(orbit, settings)
-    at_event = start is not None and _is_at_event(start, settings)
+    singular = _has_multiplier_one(
+        orbit
+    )  # at its value of the parameter Newton's method moves it anywhere
+    start = _along_null(orbit, settings) if singular else None
+    start = start or first_point(orbit, settings) or _along_null(orbit, settings)
+    at_event = start is not None and (singular or _is_at_event(start, settings))
     if start is None or (
         at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
     ):
@@ -51,6 +55,11 @@ def _along_null(orbit: Orbit, settings: Settings) -> Point | None:
     active = orbit.model.index_of(settings.parameter)
     vectors, slopes = null_space(orbit.system, orbit.joints, orbit.vector, active)
     return first_point(orbit, settings, vectors[0], slopes[0]) if len(vectors) == 1 else None
+
+
+def _has_multiplier_one(orbit: Orbit) -> bool:
+    """Tell whether a multiplier is 1 to the root of rounding: at a fold, or in a continuum (a centre)."""
+    return bool(np.abs(orbit.turn_multipliers - 1.0).min(initial=1.0) < ONE)
 
 
 def _as_symmetric(orbit: Orbit) -> Orbit:
@@ -71,9 +80,12 @@ def _as_symmetric(orbit: Orbit) -> Orbit:
 def _why(orbit: Orbit, settings: Settings) -> str:
     """Return why an orbit has no unique continuation, and what to do."""
     if in_continuum(orbit, orbit.model.index_of(settings.parameter)):
+        one_of = f"it is one of a continuum of orbits, at each {settings.parameter} near it, too"
+        if orbit.model.autonomous:
+            return f"{one_of}, as around a centre: continue in what damps or drives them"
         return (
-            f"it is one of a continuum of orbits, at each {settings.parameter} near it, too. Continue the "
-            "symmetric one of them, or vary what makes them a continuum (the damping, the frequency)"
+            f"{one_of}. Continue the symmetric one of them, or vary what makes them a continuum (the "
+            "damping, the frequency)"
         )
     return too_fast(orbit) or (
         "the equations are singular there (a bifurcation). Move the parameter a little and solve again"

@@ -10,16 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 
 from contfric.continuation.branch import Branch
-from contfric.continuation.points import MOST_POINTS
+from contfric.continuation.extrema import points_of, settings_of
+from contfric.continuation.hermite import zero_between
+from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.quantity_curve import QuantityCurve
 from contfric.curves.quantity_trace import continue_quantity
 from contfric.curves.trace import Progress
-from contfric.errors import ParameterError, real_number
+from contfric.errors import ConvergenceError, ParameterError, real_number
 from contfric.events.bifurcation import EndReason
+from contfric.orbit.orbit import Orbit
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,9 +109,7 @@ def continue_homoclinic(
             f"to {np.max(periods):.6g}"
         )
     side = next(side for side in starts if periods[side] > bound)
-    inwards = range(len(branch)) if side == 0 else range(len(branch) - 1, -1, -1)
-    first = next(k for k in inwards if periods[k] <= bound)
-    orbit = branch[first]  # the first one from the end that is not too long
+    orbit = _of_period(branch, bound, from_end=side > 0)
     found = continue_quantity(
         *(orbit, "period", bound, parameters, ranges),
         max_step=max_step,
@@ -115,3 +117,26 @@ def continue_homoclinic(
         progress=progress,
     )
     return HomoclinicCurve(**{f.name: getattr(found, f.name) for f in fields(found)})
+
+
+def _of_period(branch: Branch, period: float, *, from_end: bool) -> Orbit:
+    """Return the orbit of a branch with a period, the one nearest to an end.
+
+    Between two points of the branch, along its tangents: at its own value of the parameter a long orbit is
+    not found, as the period changes by ``1/(lambda d)`` of what the parameter does at a distance d.
+    """
+    settings = settings_of(branch)
+    active = branch.model.index_of(branch.parameter)
+
+    def longer(point: Point) -> float:
+        return point.orbit(branch, active).period - period
+
+    points = [point for _, point in points_of(branch, settings)]
+    steps = [(a, b) for a, b in pairwise(points) if longer(a) * longer(b) <= 0.0]
+    if steps:
+        found = zero_between(branch[0], *steps[-1 if from_end else 0], settings, longer)
+        if found is not None:
+            return found.orbit(branch, active)
+    raise ConvergenceError(
+        f"no orbit of the period {period:g} is found between the points of the branch"
+    )

@@ -155,7 +155,8 @@ def as_described(
 def _meets(sampler: Sampler, domain: Domain, surface: str) -> bool:
     """Tell whether some motion in a domain comes to a surface; so it is, too, where no state was sampled."""
     mode, side = domain.own_mode, domain.signs[surface]
-    places = list(sampler.on(surface, {}, _PLACES))
+    others = {name: sign for name, sign in domain.signs.items() if name != surface}
+    places = list(sampler.on(surface, others, _PLACES))
     rates = [side * sampler.rate(mode, surface, side, t, y) for t, y in places]
     return not rates or min(rates) < 0.0
 

@@ -38,8 +38,8 @@ _BESIDE, _JUMP = 1e-9, 1e-5
 def joined_modes(description: Description) -> Mapping[str, str]:
     """Return, for each mode, the first mode that is one with it: itself, most often.
 
-    Two modes are one where their fields are the same formulas, no reset and no motion on a surface lies
-    between them, and the surfaces that end them, and the resets that act in them, are the same.
+    Two modes are one where their fields are the same formulas, no reset, no kink of one and no motion on a
+    surface lies between them, and the surfaces that end them, and the resets that act in them, are the same.
     """
     return _joined(_Key(description))
 
@@ -76,7 +76,7 @@ def _sought(description: Description) -> dict[str, str]:
     lies_on = {m.name: {s for s, side in m.sides.items() if side == 0} for m in description.modes}
     acts = description.acts.items()
     mapped = {m.name: {s for s, named in acts if m.name in named} for m in description.modes}
-    fields, going_on = _Fields(description), True
+    fields, apart, going_on = _Fields(description), _kinks_of_resets(description), True
     while going_on:
         going_on = False
         for a, b in itertools.combinations(description.modes, 2):
@@ -85,7 +85,7 @@ def _sought(description: Description) -> dict[str, str]:
                 continue
             both = {name for name, lead in first.items() if lead in (first[a.name], first[b.name])}
             between = _between(description, domains, places, surfaces, both, (a.name, b.name))
-            if between and fields.agree(a, b, between):
+            if between and not between & apart and fields.agree(a, b, between):
                 lead = next(name for name in first if name in both)
                 first.update(dict.fromkeys(both, lead))
                 going_on = True
@@ -216,6 +216,24 @@ def has_kinks(description: Description, texts: Iterable[str]) -> bool:
                 seen.add(name)
                 waiting.append(parts[name])
     return False
+
+
+def _kinks_of_resets(description: Description) -> set[str]:
+    """Return the surfaces at which the image of a reset jumps or has a kink: modes at their sides differ."""
+    texts = [text for images in description.resets.values() for text in images.values()]
+    if not has_kinks(description, texts):
+        return set()
+    from contfric.models.generated.symbols import Formulas
+    from contfric.models.language.formulas import kinks_in, vanishes
+
+    formulas = Formulas(description)
+    images = [value for image in formulas.resets() for value in image]
+    kinks = {k for value in images for k in kinks_in(value, (formulas.t, *formulas.y))}
+    return {
+        name
+        for name, height in formulas.heights().items()
+        if any(vanishes(kink - height) or vanishes(kink + height) for kink in kinks)
+    }
 
 
 def _jumps(sampler: Sampler, mode: ModeText, surface: str) -> bool:

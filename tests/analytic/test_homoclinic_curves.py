@@ -53,6 +53,13 @@ def test_curve_of_a_long_period() -> None:
     assert distance(16.0) < 5e-8
 
 
+def test_curve_near_the_longest_period_of_the_branch() -> None:
+    """At its own slope such an orbit is not found again: the period changes by 5e8 of what that does."""
+    assert distance(20.0) < 1e-9
+    with pytest.raises(cf.ParameterError, match="not one of the branch"):
+        cf.continue_homoclinic(branch(), PLANE, RANGES, period=40.0)
+
+
 KICKED = """
 name: kicked
 states: [x, v]

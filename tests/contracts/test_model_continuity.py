@@ -99,7 +99,7 @@ resets: {{tick: {{s: '{map}'}}}}
 """
 
 
-#: The same solution in one mode, and in two with a surface between them at which nothing changes.
+#: The same solution in one mode, and in two with a surface between them, at which only the reset may change.
 ONE = "modes: {only: {field: {x: -x + s, s: 0}}}"
 TWO = """surfaces: {mid: {observable: x, level: ref}}
 field: {x: -x + s, s: 0}
@@ -117,11 +117,31 @@ modes: {low: {in: {mid: -}}, high: {in: {mid: +}}}"""
         ("where(x > ref, 0, x - ref)", False),
     ],
 )
-def test_a_reset_that_jumps_is_refused(tmp_path, modes: str, map: str, jumps: bool) -> None:
+def test_a_reset_that_jumps_within_a_mode_is_refused(
+    tmp_path, modes: str, map: str, jumps: bool
+) -> None:
+    jumps = jumps and modes is ONE
     (tmp_path / "model.yaml").write_text(SAMPLED.format(map=map, modes=modes), encoding="utf-8")
     report = cf.check_model(tmp_path / "model.yaml")
     assert report.ok != jumps
     assert any("after the reset at 'tick' jumps" in f.message for f in report.findings) == jumps
+
+
+def test_a_branch_ends_where_a_sample_lies_on_the_surface_at_which_the_reset_jumps(
+    tmp_path,
+) -> None:
+    text = SAMPLED.format(map="sign(ref - x)", modes=TWO)
+    (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+    branch = cf.continue_orbit(cf.find_orbit(tmp_path / "model.yaml"), "ref", (0.05, 0.8))
+    for end in branch.ends:
+        assert end.bifurcation is not None and end.reason.name == "CS"
+        orbit = end.bifurcation.orbit
+        samples = [
+            state[1]
+            for (_, surface), state in zip(orbit.itinerary, orbit.ends, strict=True)
+            if surface == "tick"
+        ]
+        assert min(abs(x - orbit.params["ref"]) for x in samples) < 1e-9
 
 
 def test_formulas_that_cannot_jump_are_told_from_those_that_may() -> None:

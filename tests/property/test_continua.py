@@ -190,3 +190,30 @@ def test_last_digits_of_the_parameters_change_nothing(seed: int) -> None:
     again = cf.explore(cf.find_orbit("coulomb", moved), "Omega", (0.3, 0.7))
     assert not again.loose_ends
     assert [*differences(whole, again), *differences(again, whole)] == []
+
+
+CENTRE = """
+name: centre
+states: [x, v]
+parameters: {{k: {k}, a: {a}, b: {b}, c: 0.0}}
+autonomous: true
+field: {{x: v, v: -k*x - a*x**2 - b*x**3 - c*v}}
+"""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cycles_around_a_centre(tmp_path, seed: int) -> None:
+    """A cycle of each size at each stiffness: no continuation in it; along the damping those without any."""
+    rng = np.random.default_rng([21, seed])
+    k, a, b = rng.uniform(0.5, 2.0), rng.uniform(-0.3, 0.3), rng.uniform(0.2, 1.0)
+    (tmp_path / "centre.yaml").write_text(CENTRE.format(k=k, a=a, b=b))
+    orbit = cf.find_orbit(cf.load_model(tmp_path / "centre.yaml"), state=rng.uniform(0.3, 1.0, 2))
+    with pytest.raises(cf.ConvergenceError, match="as around a centre"):
+        cf.continue_orbit(orbit, "k", (0.3, 3.0))
+    branch = cf.continue_orbit(orbit, "c", (-0.1, 0.1), max_points=60)
+    assert np.max(np.abs(branch.values)) < 1e-9
+    assert branch.arc[-1] > 0.1
+    energy = [
+        v**2 / 2 + k * x**2 / 2 + a * x**3 / 3 + b * x**4 / 4 for x, v in branch.joints[:, 0, 1:]
+    ]
+    assert np.ptp(energy) > 0.1 * np.median(energy)

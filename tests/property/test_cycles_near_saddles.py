@@ -10,7 +10,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.exploration import Exploration
-from contfric.continuation.ending import lost_in_end
+from contfric.continuation.ends.at_events import lost_in_end
 from contfric.continuation.points import settings_of
 from contfric.orbit.repetition import shortest
 

@@ -32,7 +32,7 @@ _ONE_VALUE = 1e-12
 #: Arclength from which a branch at one value is a continuum, and not an orbit: far above rounding.
 _LENGTH = 1e-6
 #: A multiplier is 1 to this: the root of rounding, where two of them are.
-_ONE = 1e-7
+ONE = 1e-7
 #: Points in a row from which multipliers at 1 are no event: of one, its two neighbours would be farther away.
 _RUN = 4
 #: Share of 1 + its value by which the parameter changes over them: a multiplier that is 1 at a branch point
@@ -117,7 +117,7 @@ def continua_of(branch: Branch) -> Iterator[str]:
     away = np.abs(mu - 1.0)
     if branch.system.half:  # a multiplier of the whole is the square of one of the half
         away = np.minimum(away, np.abs(mu + 1.0))
-    at_one = np.min(away, axis=1) < _ONE
+    at_one = np.min(away, axis=1) < ONE
     for first, last in _runs(at_one):
         low, high = sorted((values[first], values[last]))
         if high - low < _CHANGES * _size(branch, high):

@@ -61,6 +61,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     from contfric.models.check.passages import check_passages, check_slides
     from contfric.models.check.probe import Probe
     from contfric.models.check.reached import check_reached, check_resets_met
+    from contfric.models.check.roots import check_roots
     from contfric.models.check.scales import check_scales
     from contfric.models.check.structure import (
         check_angles,
@@ -89,6 +90,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_jumps_through(report, probe)
     check_kinks_in_time(report, probe)
     check_reset_jumps(report, probe)
+    check_roots(report, probe)
     check_kinks(report, loaded)
     check_hidden_kinks(report, probe)
     check_reset_kinks(report, probe)

@@ -237,12 +237,18 @@ def _factor(x: Any, known: Any, moving: tuple[Any, ...]) -> Any:
 
 
 def _at(formula: Any, moving: Collection[Any], shift: int) -> Any:
-    """Return the value of a formula at numbers, the same for the same symbols; ``moving`` are shifted."""
+    """Return the value of a formula at numbers, the same for the same symbols; ``moving`` are shifted.
+
+    No number where it has none.
+    """
     numbers = {
         s: sympy.Rational(crc32(str(s).encode()) % 97 + 13 * (1 + shift * (s in moving)), 31)
         for s in formula.free_symbols
     }
-    return sympy.N(formula.xreplace(numbers), _DIGITS)
+    try:
+        return sympy.N(formula.xreplace(numbers), _DIGITS)
+    except ModelError:  # the root of a number that is negative there
+        return sympy.nan
 
 
 def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:

@@ -27,7 +27,8 @@ Problem, SIAM 2009, theorem 3.3.7). The signs of a few heights tell it. Motion g
 * on none, to the sides s1 and s2, where ``s1 s1(s2) > 1`` and ``s2 s2(s1) > 1``.
 
 If A depends on parameters only, on the surfaces, all of these are levels of four observables, ``c1``, ``c2``
-and both ``s*``; else the model is refused.
+and both ``s*``. If it depends on the state or on time (the inertia of an arm with two joints), they are the
+levels 1 and -1 of six: ``-(c1 + A12 s2)/A11`` for each s2, the like on the second, and both ``s*``.
 
 This module imports sympy, and is loaded where a model asks for it.
 """
@@ -42,6 +43,7 @@ import sympy
 
 from contfric.models.description import Description, ModeText
 from contfric.models.entries import EntryError
+from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.generated.symbols import Formulas
 
 _SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
@@ -49,6 +51,8 @@ _MARK = {1: "+", -1: "-", 0: 0}
 #: Entries of the matrix, and levels that must differ, at the default parameters: rounding of numbers of order
 #: 1.
 _NOTHING = 1e-12
+#: States at which a matrix that varies is looked at.
+_PLACES = 200
 
 
 class CrossingSurfaces:
@@ -73,18 +77,18 @@ class CrossingSurfaces:
             s: [formulas.rate(heights[i], field).subs(self.known[i]) for i in (0, 1)]
             for s, field in f.items()
         }
-        self.rates = [sympy.simplify(sum(r[s][i] for s in _SIGNS) / 4) for i in (0, 1)]
+        self.rates = [_short(sum(r[s][i] for s in _SIGNS) / 4) for i in (0, 1)]
         self.matrix = sympy.Matrix(
             2,
             2,
-            lambda i, j: sympy.simplify((r[1, 1][i] - r[((-1, 1), (1, -1))[j]][i]) / 2),
+            lambda i, j: _short((r[1, 1][i] - r[((-1, 1), (1, -1))[j]][i]) / 2),
         )
-        self.det = sympy.simplify(self.matrix.det())
+        self.det = _short(self.matrix.det())
         self._check_matrix()
 
     def _check_sum(self, f: Mapping[tuple[int, int], list[Any]]) -> None:
         for k, state in enumerate(self.formulas.description.states):
-            rest = sympy.simplify(f[1, 1][k] - f[1, -1][k] - f[-1, 1][k] + f[-1, -1][k])
+            rest = sympy.simplify(_short(f[1, 1][k] - f[1, -1][k] - f[-1, 1][k] + f[-1, -1][k]))
             if rest != 0:
                 self.refuse(
                     f"the fields around that place do not add up in '{state}' (f++ - f+- - f-+ + f-- is "
@@ -92,22 +96,36 @@ class CrossingSurfaces:
                 )
 
     def _check_matrix(self) -> None:
-        """Refuse a matrix that is singular, varies, or does not drive back to both surfaces."""
+        """Refuse a matrix that is singular, or does not drive back to both surfaces."""
         if self.det == 0:
             self.refuse("the 2 x 2 system for both switches is singular")
-        if any(a.free_symbols & {self.formulas.t, *self.formulas.y} for a in self.matrix):
-            self.refuse(
-                "how strongly each switch drives depends on the state or on time, and regions of sliding "
-                "there are not derived"
-            )
-        values = self.formulas.defaults
-        a = [[float(self.matrix[i, j].subs(values)) for j in (0, 1)] for i in (0, 1)]
-        if a[0][0] >= 0 or a[1][1] >= 0 or a[0][0] * a[1][1] - a[0][1] * a[1][0] <= 0:
-            self.refuse(
-                f"at the defaults solutions are not driven back to both (the matrix of rates is {a}; its "
-                "diagonal "
-                "has to be negative, its determinant positive)"
-            )
+        formulas = self.formulas
+        arguments = [formulas.t, *formulas.y]
+        entries = sympy.lambdify(
+            arguments, [a.subs(formulas.defaults) for a in self.matrix], "math"
+        )
+        description = formulas.description
+        sampler = Sampler(floats(description), defaults(description))
+        for t, y in sampler.states(_PLACES if self.varies else 1):
+            a, b, c, d = map(float, entries(t, *y))
+            if not (a < 0 and d < 0 and a * d > b * c):
+                self.refuse(
+                    "at the defaults solutions are not driven back to both (the matrix of rates is "
+                    f"{[[a, b], [c, d]]}{self._at(t, y)}; its diagonal has to be negative, its "
+                    "determinant positive)"
+                )
+
+    @property
+    def varies(self) -> bool:
+        """Whether the matrix depends on the state or on time."""
+        moving = {self.formulas.t, *self.formulas.y}
+        return any(entry.free_symbols & moving for entry in self.matrix)
+
+    def _at(self, t: float, y: list[float]) -> str:
+        """Return in words where a matrix that varies was evaluated."""
+        names = ("t", *self.formulas.description.states)
+        values = ", ".join(f"{n} = {v:.6g}" for n, v in zip(names, (t, *y), strict=True))
+        return f" at {values}" if self.varies else ""
 
     def is_linear(self, formula: Any) -> bool:
         """Tell whether a formula is linear in the parameters, as constraints have to be."""
@@ -129,9 +147,13 @@ class CrossingSurfaces:
         levels = {state: state - height for state in self.formulas.y}
         return {s: level for s, level in levels.items() if not level.free_symbols & moving}
 
+    def on_both(self, formula: Any) -> Any:
+        """Return a formula on both surfaces."""
+        return formula.subs({**self.known[0], **self.known[1]})
+
     def text(self, formula: Any) -> str:
         """Return a formula as an expression of the model."""
-        return self.formulas.text(sympy.simplify(formula))
+        return self.formulas.text((_short if self.varies else sympy.simplify)(formula))
 
     def field(self, values: tuple[Any, Any], on: tuple[int, ...]) -> dict[str, str]:
         """Return the field of both switches at some values, on some of the surfaces."""
@@ -139,6 +161,11 @@ class CrossingSurfaces:
         known = {key: value for i in on for key, value in self.known[i].items()}
         rows = zip(self.formulas.description.states, self.mean, *self.pulls, strict=True)
         return {state: self.text((f + s1 * g1 + s2 * g2).subs(known)) for state, f, g1, g2 in rows}
+
+
+def _short(formula: Any) -> Any:
+    """Return a formula as one fraction without common factors: 0 where it vanishes."""
+    return sympy.cancel(formula)
 
 
 def _quadrants(
@@ -251,6 +278,10 @@ class _Limits:
     def _limit(self, i: int, s: int, out: int) -> str:
         """Return the surface at which sliding on surface i, on the side s of the other, ends to a side."""
         matrix, name = self.crossing.matrix, self.crossing.surfaces[i]
+        if self.crossing.varies:
+            own = -(self.crossing.rates[i] + matrix[i, 1 - i] * s) / matrix[i, i]
+            side = "" if matrix[i, 1 - i] == 0 else "_above" if s > 0 else "_below"
+            return self._surface(f"switch_{name}_alone{side}", own, sympy.Integer(out))
         # s_i = out, that is c_i = -A_ii out - A_ij s
         level, rate = -matrix[i, i] * out - matrix[i, 1 - i] * s, self.crossing.rates[i]
         if matrix[i, 1 - i] == 0 and not self.crossing.is_linear(matrix[i, i]):
@@ -272,7 +303,7 @@ class _Limits:
         name = f"switch_{self.crossing.surfaces[i]}"
         own, cross = matrix[1 - i, 1 - i], matrix[i, 1 - i]
         both = -(own * self.crossing.rates[i] - cross * self.crossing.rates[1 - i]) / det
-        return self._surface(name, both, sympy.Integer(out))
+        return self._surface(name, self.crossing.on_both(both), sympy.Integer(out))
 
     def corner(self, i: int) -> dict[str, Any]:
         """Return the sides on which the switch i is inside of [-1, 1] on both surfaces."""
