@@ -18,7 +18,7 @@ import contfric as cf
 from contfric.atlas.diagram import Diagram
 from contfric.certify import branch as branches
 from contfric.certify import diagram as diagrams
-from contfric.certify import events, files, tracing
+from contfric.certify import events, files
 from contfric.certify import limit as time_limit
 from contfric.certify.diagram_certificate import (
     DiagramCertificate,
@@ -27,6 +27,7 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import certify_event
+from contfric.certify.tubes import tracing
 from contfric.cli import main
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel

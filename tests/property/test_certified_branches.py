@@ -16,9 +16,10 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.system import build_system
 from contfric.certify.branch import certify_branch, cover
+from contfric.certify.equations import locating
 from contfric.certify.equations.chain import Chain, segments_of
 from contfric.certify.inequalities.along_segments import RATE
-from contfric.certify.tubes import locating, tracing
+from contfric.certify.tubes import tracing
 from contfric.certify.tubes.strand import Strand, in_phases
 from contfric.certify.tubes.tracing import Tracer
 from contfric.certify.tubes.tube import Box, box_between, solved
