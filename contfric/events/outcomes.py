@@ -10,6 +10,7 @@ CS, the state at a stop meets F        swap stick and reversal (a stick of lengt
 SS, followed by a reversal             insert a hold of length zero, pinned to F
 SS, followed by a stick                the stick becomes a hold pinned to F
 GS, an impact is grazed inside         split it there: an impact of speed zero
+the same, and it changes the mode      split it there: two of them, with no time between
 GS, an impact has no speed any more    drop it: the segment goes on
 AS, a stick is released tangentially   insert a hold of length zero after it
 AS, a stick touches F inside           split it there: a hold goes on
