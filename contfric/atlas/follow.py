@@ -9,7 +9,7 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain
 
@@ -160,9 +160,9 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     done: set[Itinerary] = set()
     creeps: set[Itinerary] = set()
     asked: list[Branch] = []
-    for found in chain(
-        solutions_near(orbit.as_whole(), shifts), _of_half_turns(orbit, shifts, done)
-    ):
+    whole = orbit.as_whole()
+    halves = solutions_near(whole, shifts, half=True) if orbit.symmetric else ()
+    for found in chain(solutions_near(whole, shifts), halves):
         guess = replace(found, vector=orbit.vector)
         itinerary = canonical_itinerary(guess.itinerary, orbit.model)
         if itinerary in done:
@@ -187,14 +187,6 @@ def _follow_flow(state: Exploration, event: Event) -> None:
     )
     if creeps and alone and not done and len(event.branches) == 1:
         event.final = EndReason.SHAKEDOWN
-
-
-def _of_half_turns(
-    orbit: Orbit, shifts: tuple[tuple[int, float], ...], done: set[Itinerary]
-) -> Iterator[Orbit]:
-    """Yield what solutions do in half a turn near a symmetric orbit, where no whole turn leads anywhere."""
-    if orbit.symmetric and not done:
-        yield from solutions_near(orbit.as_whole(), shifts, half=True)
 
 
 def _meeting(

@@ -66,7 +66,7 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
     """
     itinerary, i = orbit.itinerary, location.segment
     if not orbit.model.composed:
-        return _crossed(orbit, location)
+        return crossed(orbit, location)
     if is_hold(itinerary[i][1]):
         raise NotationError(f"segment {i + 1} is a hold: nothing can be held where nothing jumps")
     if location.margin is Margin.JOINT:
@@ -143,7 +143,7 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
     return edit, joints, speeds, f"{surface} is touched in segment {i + 1}: passed, and met again"
 
 
-def _crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
+def crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit at the touch of a surface that is crossed: the time beyond it begins, or vanishes.
 
     How fast the joints move apart: :func:`~contfric.events.touching.speeds_of_crossing`.

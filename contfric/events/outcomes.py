@@ -10,6 +10,7 @@ CS, the state at a stop meets F        swap stick and reversal (a stick of lengt
 SS, followed by a reversal             insert a hold of length zero, pinned to F
 SS, followed by a stick                the stick becomes a hold pinned to F
 GS, an impact is grazed inside         split it there: an impact of speed zero
+the same, and it changes the mode      split it there: two of them, with no time between
 GS, an impact has no speed any more    drop it: the segment goes on
 AS, a stick is released tangentially   insert a hold of length zero after it
 AS, a stick touches F inside           split it there: a hold goes on
@@ -44,6 +45,7 @@ from contfric.errors import NotationError
 from contfric.events import standing_slides as slides
 from contfric.events.bifurcation import Kind
 from contfric.events.contact_outcomes import continuous_edit
+from contfric.events.grazing_impacts import grazing_impact, impact_at_joint
 from contfric.events.holdable import (
     NoJump,
     check_held,
@@ -52,7 +54,7 @@ from contfric.events.holdable import (
     rest_mode,
     vanishes_with,
 )
-from contfric.events.touching import chosen_at, crossed_at, entered_at, thrown_at
+from contfric.events.touching import chosen_at, crossed_at, entered_at
 from contfric.events.zero_acceleration import (
     first_zero_acceleration,
     touch_of,
@@ -60,7 +62,6 @@ from contfric.events.zero_acceleration import (
 )
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.section_joints import crossed_at_graze
 from contfric.orbit.slides import time_unit
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
@@ -129,7 +130,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
             f"another mode follows the impact before segment {location.segment + 1}"
         )
     if location.margin is Margin.JOINT and orbit.model.reset_at(mode, location.surface) is not None:
-        return _impact_at_joint(orbit, location)
+        return Successor(*impact_at_joint(orbit, location))
     if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Successor(edit, joints, reason, away)
@@ -143,7 +144,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
     if kind is Kind.SS:
         return _stop_on_surface(orbit, location)
     if orbit.model.reset_at(mode, location.surface) is not None:
-        return _grazing_impact(orbit, location)
+        return Successor(*grazing_impact(orbit, location))
     if location.margin is Margin.JOINT:
         raise NoJump(f"{location.surface} is touched at a section: nothing can be held there")
     if location.margin is Margin.LASTING:
@@ -364,42 +365,3 @@ def _same_way(orbit: Orbit, mode: str, exit_: str, departs: str | None) -> None:
     released = release_mode(orbit.model, mode, exit_)
     if released != departs:
         raise NotationError(f"the stick is released at {exit_} into '{released}', not '{departs}'")
-
-
-def _grazing_impact(orbit: Orbit, location: EventFunction) -> Successor:
-    """GS at a reset: an impact of speed zero comes in, or goes."""
-    itinerary, i = orbit.itinerary, location.segment
-    mode, exit_ = itinerary[i]
-    if thrown_at(orbit, location):
-        raise NotationError(
-            f"after the reset at {location.surface} the solution starts somewhere else: no orbit is near"
-        )
-    if location.margin is Margin.INTERIOR:
-        edit = split(i, location.surface, (mode, exit_))
-        reason = f"impact at the touch of {location.surface} in segment {i + 1}"
-        return Successor(edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason)
-    behind = (i + 1) % len(itinerary)
-    whole = orbit.model.whole_mode
-    reason = f"no impact on {location.surface} after segment {i + 1}"
-    if pair := crossed_at_graze(orbit, i):
-        return Successor(*_renamed(orbit, i, pair), reason)
-    if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
-        raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
-    return Successor(*slides.runs_on(orbit, i, behind), reason)
-
-
-def _impact_at_joint(orbit: Orbit, location: EventFunction) -> Successor:
-    """GS at a reset where a section is crossed: the impact takes the place of the crossing."""
-    i, surface = location.segment, location.surface
-    mode, exit_ = orbit.itinerary[i]
-    if (mode, exit_) not in orbit.model.sections:
-        raise NotationError(f"the wall {surface} is met where segment {i + 1} ends")
-    reason = f"impact at the touch of {surface} where segment {i + 1} ends"
-    return Successor(*_renamed(orbit, i, (orbit.model.whole_mode(mode), surface)), reason)
-
-
-def _renamed(
-    orbit: Orbit, i: int, pair: tuple[str, str]
-) -> tuple[Edit, dict[tuple[int, int], FloatArray]]:
-    """Return the edit that gives a segment another mode and exit, and its joint."""
-    return Edit(frozenset({i}), {}, {i: (pair,)}), {(i, 0): orbit.cycle[i]}

@@ -304,10 +304,10 @@ def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Dom
         )
 
     before = next((d for d in model.domains_of(model.whole_mode(mode)) if holds(d, False)), None)
-    behind = None if before is None else model.transitions.get((before.name, surface))
-    if behind is None:
+    behind = () if before is None else model.targets.get((before.name, surface), ())
+    if not behind:
         return None
-    found = model.domain_by_name[behind]
+    found = model.domain_by_name[behind[0]]
     for name in sorted(met):
         onwards = model.transitions.get((found.name, name))
         if onwards is not None and found.signs[name] * rate(found, name) < 0.0:
