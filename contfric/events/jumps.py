@@ -7,10 +7,14 @@ a mass may either stay or leave. Then nothing can be held, and the solution is c
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache, lru_cache
+
 import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import mode_domains
+from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest, left_surface, release_mode
 
@@ -25,31 +29,56 @@ _STEPS = 5
 _MET = 1e-12
 
 
+@lru_cache(maxsize=8)  # several questions are asked of one orbit
 def nothing_jumps(orbit: Orbit) -> bool:
     """Tell whether rest is left without acceleration wherever it ends, at the parameters of an orbit."""
     model = orbit.model
     if model.filippov or model.composed:
         return model.filippov
-    rests = [d for d in model.domains if model.mode_by_name[d.mode].sliding]
-    ends = {(d.mode, s) for d in rests for s, _ in model.exits_of(d.name)}
-    limits = [(mode, s) for mode, s in sorted(ends) if ends_rest(model, mode, s)]
-    return bool(limits) and all(_left_without(orbit, mode, s) for mode, s in limits)
+    limits = _limits(model)
+    return bool(limits) and all(
+        _left_without(orbit, met, departures) for met, departures in limits.items()
+    )
 
 
-def _left_without(orbit: Orbit, mode: str, limit: str) -> bool:
-    """Tell whether a rest is left without acceleration where its load is at a limit."""
-    departs = release_mode(orbit.model, mode, limit)
-    if departs is None:
-        return False
-    cycle, leaves = orbit.cycle, left_surface(orbit.model, mode, departs)
+@cache
+def _limits(model: Model) -> Mapping[tuple[str, str], tuple[tuple[str, str], ...]]:
+    """Return where rests end: the surface that is left and the limit, with modes and those they are left to.
+
+    What another contact or a clock meets meanwhile ends no rest, as what it moves on afterwards tells.
+    """
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    for domain in model.domains:
+        mode = domain.mode
+        for limit, _ in model.exits_of(domain.name) if model.mode_by_name[mode].sliding else ():
+            departs = release_mode(model, mode, limit) if ends_rest(model, mode, limit) else None
+            if departs is None:
+                continue
+            leaves = left_surface(model, mode, departs)
+            if not model.lies_on(departs, leaves):
+                found.setdefault((leaves, limit), {})[departs] = mode
+    return {
+        met: tuple((mode, departs) for departs, mode in pairs.items())
+        for met, pairs in found.items()
+    }
+
+
+def _left_without(
+    orbit: Orbit, met: tuple[str, str], departures: tuple[tuple[str, str], ...]
+) -> bool:
+    """Tell whether rests are left without acceleration where a load is at its limit."""
+    cycle = orbit.cycle
     chosen = cycle[np.linspace(0, len(cycle) - 1, min(_JOINTS, len(cycle))).astype(int)]
-    scale = max(abs(leaving_rate(orbit, mode, departs, joint)) for joint in chosen)
+    scale = {
+        pair: max(abs(leaving_rate(orbit, *pair, joint)) for joint in chosen) for pair in departures
+    }
     asked = False
-    for joint in chosen:
-        there = _moved(orbit, joint, (leaves, limit))
+    for there in (_moved(orbit, joint, met) for joint in chosen):
         if there is None:
             continue
-        if abs(leaving_rate(orbit, mode, departs, there)) > _ROUNDING * scale:
+        if any(
+            abs(leaving_rate(orbit, *pair, there)) > _ROUNDING * scale[pair] for pair in departures
+        ):
             return False
         asked = True
     return asked
