@@ -47,10 +47,11 @@ to each other than 1e-7 of the range. In case 36 of seed 36 branches of three pe
 of six holds turn: some are said to end there, and one half of another is counted twice.
 
 **What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
-failures: all cases with S = S0, or with Omega = 1/n and no damping; two events of one solution that are
+failures: values at which Omega = 1/n and nothing is damped; two events of one solution that are
 nearer than their accuracies; and smooth events at which a second condition fails
-(`contfric/atlas/degenerate.py`). Events excuse what differs at them, or is joined to the start by them
-alone. Cases that take longer than a limit are cut (in runs that name no commit
+(`contfric/atlas/degenerate.py`). They excuse what differs at them, or is joined to the start by them
+alone. Runs that name no commit excuse all cases with S = S0, or with Omega = 1/n where zeta varies, too.
+Cases that take longer than a limit are cut (in runs that name no commit
 those with too many branches, too). The tables show how many there are.
 
 **To repeat.** `make stress` repeats everything. One run, and the page:

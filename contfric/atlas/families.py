@@ -90,7 +90,7 @@ def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | No
         return None
     found = refine(guess)
     lasts = found.durations
-    k = int(np.argmin(lasts))
+    k = int(np.argmin(lasts[: len(orbit.joints)]))  # the other half lasts as long
     if found.converged and not found.admissible and lasts[k] < 0.0:
         for times in _LONGER:
             joints = orbit.joints.copy()

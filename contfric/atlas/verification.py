@@ -13,7 +13,7 @@ large amplitudes
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING
@@ -113,7 +113,7 @@ class Verification:
     def explained(self) -> bool:
         """Whether degenerate events explain all faults: what differs is at them, or joined by them alone."""
         return all(r.same or r.explained for r in self.restarts) and all(
-            b.holds or any(d.holds(b.value) for d in self.degenerate) for b in self.balances
+            b.holds or _holds(self.degenerate, b.value) for b in self.balances
         )
 
     @property
@@ -142,7 +142,9 @@ class Verification:
         return "\n".join(lines)
 
 
-def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verification:
+def verify(
+    diagram: Diagram, restarts: int = 6, step: float = STEP, known: Sequence[Degenerate] = ()
+) -> Verification:
     """Hold a diagram against restarts and sums of indices.
 
     Parameters
@@ -151,11 +153,13 @@ def verify(diagram: Diagram, restarts: int = 6, step: float = STEP) -> Verificat
         Most branches that it is explored again from: bridges and others in turn, spread over the list.
     step : float
         Largest step of the restarts, in largest steps of the diagram.
+    known : sequence of Degenerate
+        Values of the parameter at which the equations are known to be degenerate, whatever the events tell.
     """
     with one_thread():
-        again = tuple(_restart(diagram, i, step) for i in _chosen(diagram, restarts))
+        again = tuple(_restart(diagram, i, step, known) for i in _chosen(diagram, restarts))
         sums = tuple(balances(diagram)), tuple(index_sums(diagram))
-        return Verification(again, *sums, tuple(degenerate_events(diagram)))
+        return Verification(again, *sums, (*degenerate_events(diagram), *known))
 
 
 # --------------------------------------------------------------------------------- restarts
@@ -182,7 +186,7 @@ def _spread(locations: list[int], most: int) -> list[int]:
     ]
 
 
-def _restart(diagram: Diagram, i: int, step: float) -> Restart:
+def _restart(diagram: Diagram, i: int, step: float, known: Sequence[Degenerate]) -> Restart:
     branch, refused = diagram.branches[i], ""
     for start in _starts(branch):
         value = start.params[diagram.parameter]
@@ -192,11 +196,17 @@ def _restart(diagram: Diagram, i: int, step: float) -> Restart:
             refused = refused or f"any continuation: {error}"
             continue
         more, less = tuple(differences(again, diagram)), tuple(differences(diagram, again))
-        own = tuple(degenerate_events(again)) if less or more else ()
-        texts = tuple(map(str, own))
-        explained = bool(less or more) and not _told_apart(diagram, i, again, own)
-        return Restart(i, value, less, more, again.complete, texts, explained)
-    return Restart(i, value, (refused,), (), True)
+        if not (less or more):
+            return Restart(i, value, less, more, again.complete)
+        own = (*degenerate_events(again), *known)
+        explained = _holds(known, value) or not _told_apart(diagram, i, again, own)
+        return Restart(i, value, less, more, again.complete, tuple(map(str, own)), explained)
+    return Restart(i, value, (refused,), (), explained=_holds(known, value))
+
+
+def _holds(known: Sequence[Degenerate], value: float) -> bool:
+    """Tell whether a value of the parameter is one at which the equations are known to be degenerate."""
+    return any(degenerate.holds(value) for degenerate in known)
 
 
 def _told_apart(

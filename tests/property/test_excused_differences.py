@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import networkx as nx
 import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.atlas import verification
 from contfric.atlas.degenerate import Degenerate, joined_surely
 from contfric.atlas.verification import _told_apart
+
+sys.path.insert(0, FOLDER := str(Path(__file__).parents[2] / "benchmarks" / "stress"))
+from restarts import Scene, excuses
+
+sys.path.remove(FOLDER)
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 RANGE = (0.47, 0.56)
@@ -90,3 +98,41 @@ def test_a_missing_branch_is_explained_where_all_its_events_are(
     without = replace(diagram, branches=tuple(diagram.branches[i] for i in kept), nodes=nodes)
     assert _told_apart(diagram, 0, without, ())
     assert not _told_apart(diagram, 0, without, tuple(ends))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_known_excuses_nothing_elsewhere(
+    diagram: cf.Diagram, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A restart lacks an event: that is explained where the equations are degenerate at its own value."""
+    rng = np.random.default_rng([3, seed])
+    lost, other = (int(k) for k in rng.choice(len(diagram.events), 2, replace=False))
+    node = diagram.events[lost]
+    without = replace(diagram, nodes=tuple(n for n in diagram.nodes if n is not node))
+    monkeypatch.setattr(verification, "_explored", lambda *_: without)
+    for known in ((), (at(diagram, other),)):
+        found = verification.verify(diagram, 3, known=known)
+        assert not found.same and not found.explained
+    assert verification.verify(diagram, 3, known=(at(diagram, lost),)).explained
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_studies_are_excused_only_where_their_equations_are_degenerate(seed: int) -> None:
+    """Omega = 1/n without damping: at no other damping, and for no other reason such as equal limits."""
+    rng = np.random.default_rng([4, seed])
+    n, friction = int(rng.integers(1, 12)), float(rng.uniform(0.05, 1.0))
+    base = {"Omega": 1.0 / n, "S": friction, "S0": friction * rng.uniform(1.1, 2.0), "h": 0.1}
+    damped, undamped = {**base, "zeta": float(rng.uniform(0.001, 0.1))}, {**base, "zeta": 0.0}
+    (found,) = excuses(Scene(damped, "zeta", (-0.02, 0.2)))
+    assert found.holds(0.0) and not found.holds(damped["zeta"])
+    (found,) = excuses(Scene(undamped, "h", (0.0, 0.2)))
+    assert found.holds(0.1)
+    assert not excuses(Scene(damped, "h", (0.0, 0.2)))
+    between = {"Omega": 1.0 / (n + 0.3)}
+    assert not excuses(Scene({**undamped, **between}, "h", (0.0, 0.2)))
+    equal = {"S0": friction}
+    assert not excuses(Scene({**undamped, **between, **equal}, "h", (0.0, 0.2)))
+    near = 0.9 / n, 1.01 / n
+    assert not excuses(Scene(undamped, "Omega", near))
+    found = excuses(Scene({**undamped, **equal}, "Omega", near))
+    assert any(d.holds(1.0 / n) for d in found) and not any(d.holds(0.97 / n) for d in found)
