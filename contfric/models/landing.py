@@ -146,8 +146,8 @@ class Landing:
             joined = joined_modes(self.sampler.evaluator.description)
             raise EntryError(
                 ("modes", mode),
-                f"the reset at '{self.surface}' leads to '{joined[mode]}', which stays on the surface '{surface}': "
-                f"write '{surface}: 0' to its 'in'",
+                f"the reset at '{self.surface}' leads to '{joined[mode]}', which stays on the surface "
+                f"'{surface}': write '{surface}: 0' to its 'in'",
             )
         raise EntryError(
             ("resets", self.surface),
