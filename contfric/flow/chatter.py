@@ -51,6 +51,9 @@ _NODES = 8
 SHARE = 0.5
 #: Extrapolations that differ by less than this, relative to the size of time and states, have rounding left.
 _EXACT = 4e-16
+#: What the rounding of a state is in that of the time: each flight and impact rounds it some times, and the
+#: weights of the nodes add up to about three.
+_STATES = 16.0
 #: Where they differ by more than this the impacts converge to nothing.
 _CLOSE = 1e-8
 #: Impacts after which there is no limit: with a restitution of 0.99 speeds fall by a thousand in 700.
@@ -103,7 +106,8 @@ def difference(nodes, count, unit):  # type: ignore[no-untyped-def]
         last, total = nodes.values[count - 1, q], 0.0
         for i in range(count - 1):
             total += nodes.weights[i] * (nodes.values[i, q] - last)
-        largest = max(largest, abs(total) / ((unit if q == 0 else 1.0) + abs(last)))
+        size = unit + abs(last) if q == 0 else _STATES * (1.0 + abs(last))
+        largest = max(largest, abs(total) / size)
     return largest
 
 
