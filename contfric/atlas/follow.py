@@ -57,7 +57,7 @@ from contfric.signature.edits import show
 
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
-#: A bridge shorter than this violates a condition by its square from the start on, which is rounding up to
+#: A branch shorter than this violates a condition by its square from the start on, which is rounding up to
 #: there (1e-10 at a slack of 1e-9 over a rate that is small).
 _ROUNDED = 1e-5
 #: A first point that violates a condition by more than this is outside: rounding is a tenth of it.
@@ -314,13 +314,20 @@ def _begins_continuum(state: Exploration, orbit: Orbit | None, event: Event) -> 
 
 
 def _has_no_width(branch: Branch, event: Event, settings: Settings) -> bool:
-    """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only."""
+    """Tell whether a branch begins and ends at one event and is nowhere else: admissible to rounding only.
+
+    Where a half of a symmetric orbit cannot change without the other, its change alone ends at once. That end
+    may have other joints than the event (where the phase is cut by sections): their parameters tell.
+    """
     if branch.arc[-1] <= NO_WIDTH and ends_at(branch.ends[1], event, settings):
         return True
     last, b = branch.ends[1].bifurcation, event.bifurcation
-    if last is None or not branch.bridge or branch.arc[-1] >= _ROUNDED:
+    if last is None or branch.arc[-1] >= _ROUNDED or not same_kind(last, b):
         return False
-    return same_kind(last, b) and last.outline.apart(b.outline) < SAME_SOLUTION
+    if branch.bridge:
+        return last.outline.apart(b.outline) < SAME_SOLUTION
+    gap = abs(last.params[settings.parameter] - b.params[settings.parameter])
+    return gap <= settings.width * max(last.accuracy, b.accuracy)
 
 
 # --------------------------------------------------------------------------- branch points

@@ -12,10 +12,12 @@ also for durations d that end before ``t*``, so that Newton's method has a smoot
 *The limit.* The map has a line of fixed points, at the speeds v = 0, with multiplier e (the restitution)
 across it; so all impacts of one chatter lie on one smooth curve ``(t, y) = z(v)`` that ends in
 ``z(0) = (t*, y*)`` [1]_. It is found by extrapolation of the polynomial through the impacts with speeds v_i
-(each at most half of the one before) to v = 0. The last two extrapolations differ by about their error. No
-impact is needed at which rounding counts, whose share in the time of a flight is eps / v. Where impacts pass
-the surface (a block that rocks) flights lie on both sides of it in turn, by two fields: the map of two
-flights has that line of fixed points, with multiplier e^2, and every second impact is on its curve.
+(each at most half of the one before) to v = 0. The last two extrapolations differ by about their error; they
+go on until that is rounding in the time and in all states (a state that follows quickly needs slower impacts
+than the time does). No impact is needed at which rounding counts, whose share in the time of a flight is
+eps / v. Where impacts pass the surface (a block that rocks) flights lie on both sides of it in turn, by two
+fields: the map of two flights has that line of fixed points, with multiplier e^2, and every second impact is
+on its curve.
 
 *Derivatives* are those of the polynomial's value where its nodes move: ``sum_i w_i (dz_i - z'(v_i) dv_i)``
 with Lagrange's weights w_i at 0. Those of the nodes are products of the derivatives of flights and resets.
@@ -47,9 +49,12 @@ CHATTERING = HandleType("chattering", LAYOUT)
 _NODES = 8
 #: A node has at most this share of the speed of the one before: nearer ones would cancel each other.
 SHARE = 0.5
-#: Extrapolations that differ by less than this (relative to 1 + the time) have rounding left.
+#: Extrapolations that differ by less than this, relative to the size of time and states, have rounding left.
 _EXACT = 4e-16
-#: Where they differ by more than this share of a period the impacts converge to nothing.
+#: What the rounding of a state is in that of the time: each flight and impact rounds it some times, and the
+#: weights of the nodes add up to about three.
+_STATES = 16.0
+#: Where they differ by more than this the impacts converge to nothing.
 _CLOSE = 1e-8
 #: Impacts after which there is no limit: with a restitution of 0.99 speeds fall by a thousand in 700.
 MOST_IMPACTS = 10_000
@@ -65,23 +70,45 @@ LONGEST = 64.0
 
 
 @helper
-def weights_at_rest(speeds, first, count, weights):  # type: ignore[no-untyped-def]
-    """Write Lagrange's weights at 0 of the nodes from ``first`` on."""
-    for i in range(first, count):
+def weights_at_rest(speeds, count, weights):  # type: ignore[no-untyped-def]
+    """Write Lagrange's weights at 0 of the nodes."""
+    for i in range(count):
         weights[i] = 1.0
-        for j in range(first, count):
+        for j in range(count):
             if j != i:
                 weights[i] *= speeds[j] / (speeds[j] - speeds[i])
 
 
 @helper
-def extrapolated(speeds, nodes, first, count, weights, k):  # type: ignore[no-untyped-def]
-    """Return component k of the polynomial through the nodes from ``first`` on at 0."""
-    weights_at_rest(speeds, first, count, weights)
+def extrapolated(nodes, count, weights, k):  # type: ignore[no-untyped-def]
+    """Return component k of the polynomial through the nodes at 0."""
     total = 0.0
-    for i in range(first, count):
+    for i in range(count):
         total += weights[i] * (nodes[i, k] - nodes[count - 1, k])
     return nodes[count - 1, k] + total
+
+
+@helper
+def difference(nodes, count, unit):  # type: ignore[no-untyped-def]
+    """Return how much the first node matters at 0: the largest share of the size of the time or a state.
+
+    Polynomials with and without it differ by ``[z_0, ..., z_m] prod_{i > 0} (-v_i)``, a divided difference.
+    """
+    speeds, largest = nodes.speeds, 0.0
+    for i in range(count):
+        nodes.weights[i] = 1.0
+        for j in range(count):
+            if j > 0:
+                nodes.weights[i] *= -speeds[j]
+            if j != i:
+                nodes.weights[i] /= speeds[i] - speeds[j]
+    for q in range(nodes.values.shape[1]):
+        last, total = nodes.values[count - 1, q], 0.0
+        for i in range(count - 1):
+            total += nodes.weights[i] * (nodes.values[i, q] - last)
+        size = unit + abs(last) if q == 0 else _STATES * (1.0 + abs(last))
+        largest = max(largest, abs(total) / size)
+    return largest
 
 
 @helper
@@ -238,8 +265,9 @@ def keep_node(nodes, count, v, t, y, slopes, side, grad):  # type: ignore[no-unt
 @helper
 def write_limit(nodes, count, limit, jac):  # type: ignore[no-untyped-def]
     """Write the extrapolated limit, with its derivatives where there is space for them."""
+    weights_at_rest(nodes.speeds, count, nodes.weights)
     for q in range(limit.shape[0]):
-        limit[q] = extrapolated(nodes.speeds, nodes.values, 0, count, nodes.weights, q)
+        limit[q] = extrapolated(nodes.values, count, nodes.weights, q)
     for q in range(jac.shape[0]):
         jac[q, :] = 0.0
         for i in range(count):
@@ -268,7 +296,7 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         np.zeros((_NODES, rows, width)),
         np.empty(_NODES),
     )
-    none, empty, speeds, weights = which[:0], grad[:0], nodes.speeds, nodes.weights
+    none, empty, speeds = which[:0], grad[:0], nodes.speeds
     c, node_side, period = motion.gaps[mode], 0, motion.period(p, which[:0], grad[:0])
     unit, longest = (period, LONGEST * period) if period > 0.0 else (1.0, np.inf)
     count, highest, last, found, before = 0, 0.0, np.inf, False, np.inf
@@ -292,11 +320,10 @@ def limit_of(motion, mode, t0, y0, p, which, limit, jac):  # type: ignore[no-unt
         if count == 0 or (side == node_side and v <= SHARE * speeds[count - 1]):
             count = keep_node(nodes, count, v, t, y, slopes, side, grad)
             if count > 2:
-                shorter = extrapolated(speeds, nodes.values, 1, count, weights, 0)
-                error = abs(extrapolated(speeds, nodes.values, 0, count, weights, 0) - shorter)
-                rounding = error >= last and last <= _CLOSE * unit
+                error = difference(nodes, count, min(unit, 1.0))
+                rounding = error >= last and last <= _CLOSE
                 last = error
-                if error <= _EXACT * (1.0 + abs(t)) or rounding:
+                if error <= _EXACT or rounding:
                     found = True
                     break
         tau = fly(motion, mode, t, y, p, which, slopes)

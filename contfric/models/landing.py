@@ -8,7 +8,7 @@ arrives at: it is so for all of them, or it is not so.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 from contfric.models.definition import Domain, Reset, Surface
@@ -16,6 +16,7 @@ from contfric.models.entries import EntryError
 from contfric.models.evaluate import Sampler
 from contfric.models.language.grammar import parse
 from contfric.models.parts import EITHER, Lead, led
+from contfric.models.sections import joined_modes
 from contfric.models.shorthand.angles import wraps_of
 
 #: States on a surface that are asked: what a single one says may be an accident.
@@ -141,6 +142,13 @@ class Landing:
                 f"a turn ends at '{self.surface}', and no mode holds after it, so that nothing turns round: "
                 "leave 'angles' out, and write a wall that is met in each turn as sin((theta - wall)/2) = 0",
             )
+        if mode := self._staying(surface, met, named, images):
+            joined = joined_modes(self.sampler.evaluator.description)
+            raise EntryError(
+                ("modes", mode),
+                f"the reset at '{self.surface}' leads to '{joined[mode]}', which stays on the surface "
+                f"'{surface}': write '{surface}: 0' to its 'in'",
+            )
         raise EntryError(
             ("resets", self.surface),
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
@@ -148,6 +156,23 @@ class Landing:
             "mode to which it leads ('to: mode', which lies on one side of that surface)"
             f"{_ADVICE.format(surface) if own and len(told) > 1 else ''}",
         )
+
+    def _staying(
+        self,
+        surface: str,
+        met: Sequence[str],
+        named: Container[str],
+        images: Sequence[tuple[Domain, float, list[float]]],
+    ) -> str | None:
+        """Return a mode that a reset leads to and in which the surface's observable keeps its level."""
+        stays: dict[str, bool] = {}
+        for before, t, y in images:
+            for domain in self._behind(before, met, t, y):
+                side = domain.signs[surface]
+                rate = self.sampler.rate(domain.mode, surface, side, t, y)
+                still = side != 0 and abs(rate) <= _ON * (1.0 + max(map(abs, y)))
+                stays[domain.own_mode] = stays.get(domain.own_mode, True) and still
+        return next((mode for mode, still in stays.items() if still and mode in named), None)
 
     def _may_be_slower(self, surface: str) -> bool:
         """Tell whether sides of other surfaces say on which side of its own what is kicked goes on.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -118,7 +119,9 @@ MISTAKES = [
     ("S: 0.2", "S: '1e-2'", 5, "a number has no quotes"),
     ("default: 0.5", "defualt: 0.5", 4, "did you mean 'default'?"),
     ("S: 0.2", "sin: 0.2", 5, "means a function"),
-    ("S: 0.2", "lambda: 0.2", 5, "word of Python"),
+    ("S: 0.2", "lambda: 0.2", 5, "word of Python; write lambda_ or λ"),
+    ("S: 0.2", "del: 0.2", 5, "word of Python; write del_"),
+    ("v: -u - S", "v: -lambda*v - S", 15, "word of Python: write lambda_ or λ"),
     ("S: 0.2", "x: 0.2", 5, "has the name of a state"),
     ("Omega > 0, S", "Omega > 0, S*S", 6, "must be linear"),
     ("Omega > 0, S", "Omega < 0 < S, S", 6, "a constraint is such as"),
@@ -182,6 +185,51 @@ def test_mistakes_have_their_line(tmp_path: Path, old: str, new: str, line: int,
     message = str(caught.value)
     assert message.startswith(f"{path}:{line}: "), message
     assert says in message
+
+
+@pytest.mark.parametrize("name", ["lambda_", "λ", "del_"])
+def test_names_that_are_proposed_for_words_of_python_can_be_used(tmp_path: Path, name: str) -> None:
+    text = GOOD.replace("S: 0.2", f"S: 0.2\n  {name}: 0.3")
+    path = written(tmp_path, text.replace("v: -u - S", f"v: -u - {name}*v - S"))
+    model = cf.load_model(path)
+    view = model.view(model.vector({}))
+    assert view.rate("forward", "v", 0.0, [1.0, 2.0]) == pytest.approx(-0.3 * 2.0 - 0.2)
+
+
+TIMED = """
+name: timed
+states: [temp, s]
+parameters: {q: 2.0, c: 0.3, low: 1.0, high: 1.4, wait: 0.2}
+autonomous: true
+surfaces:
+  hot: {observable: temp, level: high}
+  cold: {observable: temp, level: low}
+  ready: {observable: s, level: wait}
+modes:
+  heats: {in: {ready: -}, field: {temp: q - c*temp, s: 1}}
+  may_stop: {in: {hot: -}, field: {temp: q - c*temp, s: 0}}
+  cools: {in: {ready: -}, field: {temp: -c*temp, s: 1}}
+  may_start: {in: {cold: +}, field: {temp: -c*temp, s: 0}}
+resets:
+  ready: {to: {may_stop: {from: heats}, may_start: {from: cools}}}
+  hot: {s: 0, to: cools, from: [may_stop]}
+  cold: {s: 0, to: heats, from: [may_start]}
+"""
+
+
+def test_a_timer_that_stays_at_its_level_is_told_what_to_write(tmp_path: Path) -> None:
+    """Each message names a mode and its line; with both written the cycle is that in closed form."""
+    text = TIMED
+    for mode, side, line in (("may_stop", "hot: -", 12), ("may_start", "cold: +", 14)):
+        path = written(tmp_path, text)
+        with pytest.raises(cf.ModelError, match=f"leads to '{mode}'.*write 'ready: 0'") as caught:
+            cf.load_model(path)
+        assert str(caught.value).startswith(f"{path}:{line}: ")
+        text = text.replace(f"in: {{{side}}}", f"in: {{ready: 0, {side}}}")
+    orbit = cf.find_orbit(written(tmp_path, text))
+    level = 2.0 / 0.3  # heats towards q/c, cools towards 0
+    period = (math.log((level - 1.0) / (level - 1.4)) + math.log(1.4 / 1.0)) / 0.3
+    assert orbit.period == pytest.approx(period, abs=1e-12)
 
 
 def test_missing_files_and_names(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def _source(text: str | float) -> str:
 def _syntax(source: str, error: SyntaxError) -> str:
     words = {w for w in re.findall(r"\w+", source) if keyword.iskeyword(w)}
     if foreign := sorted(words - {"and", "or", "not", "if", "else"}):
-        return f"'{foreign[0]}' is a word of Python: use another name"
+        return f"'{foreign[0]}' is a word of Python: {_instead(foreign[0])}"
     if "if" in words:
         return "a choice is written where(condition, a, b)"
     place = source[max((error.offset or 1) - 1, 0) :]
@@ -128,6 +128,10 @@ def _syntax(source: str, error: SyntaxError) -> str:
     product = re.search(r"(?<![\w.])\d+(?:\.\d*)?\s*[A-Za-z_(]|\w\s+\w|\)\s*[\w(]", source)
     hint = f": a product needs its * (in '{product.group()}')" if product else ""
     return f"{error.msg or 'no expression'}{where}{hint}"
+
+
+def _instead(word: str) -> str:
+    return f"write {word}_" + (" or λ" if word == "lambda" else "")
 
 
 def _short(text: str) -> str:
@@ -239,7 +243,7 @@ def check_name(name: object, what: str) -> str:
             f"{what} {name!r}: a name has letters, digits and _, and begins with a letter"
         )
     if keyword.iskeyword(name):
-        raise ModelError(f"{what} '{name}': this is a word of Python; take another name")
+        raise ModelError(f"{what} '{name}': this is a word of Python; {_instead(name)}")
     if name in RESERVED:
         meaning = _MEANINGS.get(name, "a function")
         raise ModelError(f"{what} '{name}': this name means {meaning}; take another one")
