@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contfric.bvp.linear import null_space
-from contfric.continuation.families.continuum import LEVEL, ONE, in_continuum
+from contfric.continuation.families.continuum import LEVEL, in_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import EXTRA, Point, Settings, next_to
 from contfric.continuation.singular_points.vertices import symmetrised
@@ -23,6 +23,8 @@ _NEARLY_SYMMETRIC = 1e-6
 _ROUNDING = 1e-14
 #: Share of its level by which rounding leaves the end of a segment open, above which Newton's method fails.
 _UNKNOWN = 1e-4
+#: What a solved orbit may still be moved by (relative): the root of rounding, next to a fold, and some more.
+_MOVED = 1e-6
 #: Where a start is looked for that is at no event, relative to the range: in the first steps from it.
 _BESIDE_START = (1.3e-3, -1.3e-3)
 
@@ -36,12 +38,11 @@ def start_of(orbit: Orbit, settings: Settings) -> tuple[Orbit, Point]:
         If the orbit has no unique continuation.
     """
     orbit = _as_symmetric(canonical(orbit).as_half())
-    singular = _has_multiplier_one(
-        orbit
-    )  # at its value of the parameter Newton's method moves it anywhere
-    start = _along_null(orbit, settings) if singular else None
-    start = start or first_point(orbit, settings) or _along_null(orbit, settings)
-    at_event = start is not None and (singular or _is_at_event(start, settings))
+    start = first_point(orbit, settings)
+    moved = start is None or _is_elsewhere(start, orbit)
+    if moved:
+        start = _along_null(orbit, settings) or start
+    at_event = start is not None and (moved or _is_at_event(start, settings))
     if start is None or (
         at_event and in_continuum(orbit, orbit.model.index_of(settings.parameter))
     ):
@@ -57,9 +58,10 @@ def _along_null(orbit: Orbit, settings: Settings) -> Point | None:
     return first_point(orbit, settings, vectors[0], slopes[0]) if len(vectors) == 1 else None
 
 
-def _has_multiplier_one(orbit: Orbit) -> bool:
-    """Tell whether a multiplier is 1 to the root of rounding: at a fold, or in a continuum (a centre)."""
-    return bool(np.abs(orbit.turn_multipliers - 1.0).min(initial=1.0) < ONE)
+def _is_elsewhere(start: Point, orbit: Orbit) -> bool:
+    """Tell whether Newton's method has moved a solved orbit: it may where a multiplier is 1 (a centre)."""
+    largest = 1.0 + float(np.abs(orbit.joints).max())
+    return float(np.abs(start.joints - orbit.joints).max()) > _MOVED * largest
 
 
 def _as_symmetric(orbit: Orbit) -> Orbit:

@@ -98,7 +98,6 @@ class Mode(SchemaPart):
     field: Rates = LEFT_OUT
     sliding: Flag = None
     rank: int = said("a whole number from 0 to that of the states", default=None, ge=0)
-    derived: Flag = None
 
 
 class Domain(SchemaPart):
@@ -196,7 +195,7 @@ class ModelFile(AnyModel):
     states: list[str] = said("a list of names, such as [x, v]", min_length=1)
     surfaces: dict[str, Surface] = mapping("a mapping of names to {observable: ..., level: ...}")
     field: Rates = LEFT_OUT
-    modes: dict[str, Annotated[Mode, instead({})]] = mapping(
+    modes: Mapping[str, Annotated[Mode, instead({})]] = mapping(
         "a mapping of names to {in: sides of surfaces, field: {state: rate}}"
     )
     domains: dict[str, Domain] = mapping(
@@ -287,9 +286,18 @@ class Chatter(SchemaPart):
     other_lift: Text = ""
 
 
+class WrittenMode(Mode):
+    """A mode of a model that is written out."""
+
+    derived: Flag = None
+
+
 class WrittenOut(ModelFile):
     """A model with all that is derived from what is said in short."""
 
+    modes: Mapping[str, Annotated[WrittenMode, instead({})]] = mapping(
+        "a mapping of names to {in: sides of surfaces, field: {state: rate}}"
+    )
     chatters: dict[str, Chatter] = EMPTY
     forces: dict[str, Law] = EMPTY
     in_units: Units = EMPTY

@@ -76,14 +76,16 @@ def test_a_fold_is_one_however_near_to_it_a_step_ends(monkeypatch):
 def test_a_fold_of_a_short_branch_is_one_however_near_to_it_a_step_ends(monkeypatch):
     """So far away as its parabola is told from rounding in general there are no orbits of it."""
     rng, told = np.random.default_rng(6), 0
-    for orbit, point, settings in _bridge_folds(monkeypatch, SHORT, "zeta", (-0.012, 0.0)):
-        here = point.orbit(orbit, orbit.model.index_of(settings.parameter))
+    for step, point in _bridge_folds(monkeypatch, SHORT, "zeta", (-0.012, 0.0)):
+        here = step.orbit_at(point)
         if point.arc < 1e-4:
             continue  # at an event, next to which slopes are rounding
         for _ in range(4):
             near, far = 10.0 ** rng.uniform(-7.0, -5.0), 10.0 ** rng.uniform(-4.0, -3.0)
-            before, after = (point_before(here, point, back, settings) for back in (far, -near))
-            found = fold_at(orbit, before, after, after, point, settings)
+            before, after = (
+                point_before(here, point, back, step.settings) for back in (far, -near)
+            )
+            found = fold_at(replace(step, before=before, after=after, beyond=after), point)
             assert [event.kind for event, _ in found] == [Kind.SN]
             told += 1
     assert told
