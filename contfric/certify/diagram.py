@@ -27,7 +27,7 @@ from contfric.certify.diagram_certificate import (
     merged,
 )
 from contfric.certify.events import EventCertificate, certify_event
-from contfric.certify.files import checkable, checked
+from contfric.certify.files import checkable, checked, told_apart
 from contfric.certify.limit import LATE, latest
 from contfric.certify.tubes.tube_file import tubes_of
 from contfric.chaos.running import Progress, check_executor, compute_all
@@ -115,7 +115,7 @@ def certify_diagram(
         time.time() - began,
         ended,
         (
-            *(part for parts, _ in written.values() for part in parts),
+            *told_apart(part for parts, _ in written.values() for part in parts),
             *(tube for k in sorted(results) for tube in results[k].tubes),
         ),
     )

@@ -24,8 +24,8 @@ from contfric.signature.edits import Edit, drop
 from contfric.signature.holds import TOUCH
 
 #: A hold that takes longer to cross a strip (in units of time) has a branch of its own: it moves stops by
-#: more than the third power of this.
-CROSSES = 1e-3
+#: about the third power of this, 8e-12, which is less than what two events are told apart by (1e-11).
+CROSSES = 2e-4
 #: A regular slide from the limit on lasts twice as long as the hold that crosses the strip; Newton's method
 #: starts farther out, where the equation is convex.
 _FARTHER = 2.0
