@@ -99,6 +99,7 @@ def ends_rest(model: Model, mode: str, exit_: str) -> bool:
     return bool(model.mode_by_name[mode].sliding) and not comes_to_rest(model, mode, exit_)
 
 
+@cache
 def left_surface(model: Model, mode: str, departs: str) -> str:
     """Return the surface of a rest that a departing mode leaves: that of the contact that lets go."""
     resting, still = _rested_on(model, mode), _rested_on(model, departs)

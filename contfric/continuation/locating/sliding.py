@@ -257,14 +257,14 @@ def _grazed_stop(here: Orbit, point: Point, first: int) -> int:
     i = test.segment
     limit = _grazed_limit(here, point, first)
     # a hold ends at a load, as rest does: nothing slides up to it
-    if limit != first or is_hold(here.itinerary[i][1]) or not nothing_jumps(here):
+    if limit != first or is_hold(here.itinerary[i][1]):
         return limit
     if here.durations[i] <= _VANISHED * here.period:
         return first
     for k, other in enumerate(tests):
         tangential = other.margin is Margin.EXIT and abs(point.tests[k]) < _NEARLY_REACHED
         if tangential and other.segment == i:
-            return k
+            return k if nothing_jumps(here) else first
     return first
 
 
