@@ -86,21 +86,22 @@ def joined_surely(
 
     Every exploration from that branch has them, up to symmetry.
     """
+    import networkx as nx
+
     # the image of a branch is listed after it
     own = [i - int(branch.mirrored) for i, branch in enumerate(diagram.branches)]
     known = tuple(degenerate)
+    graph: nx.Graph[int] = nx.Graph()
     nodes = [
-        (node, {own[i] for i in node.branches})
+        (node.bifurcation, [own[i] for i in node.branches])
         for node in diagram.nodes
         if not any(d.holds(node.bifurcation.params[diagram.parameter]) for d in known)
     ]
-    reached, before = {own[first]}, 0
-    while len(reached) > before:
-        before = len(reached)
-        for _, branches in nodes:
-            if branches & reached:
-                reached |= branches
-    events = tuple(node.bifurcation for node, branches in nodes if branches & reached)
+    graph.add_node(own[first])
+    for _, branches in nodes:
+        nx.add_path(graph, branches)
+    reached = nx.node_connected_component(graph, own[first])
+    events = tuple(event for event, branches in nodes if branches[0] in reached)
     return events, tuple(diagram.branches[i] for i in sorted(reached))
 
 

@@ -26,7 +26,6 @@ from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_locatio
 from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
-from contfric.continuation.ends.at_events import lost_in_end
 from contfric.continuation.points import LARGEST_STEP
 from contfric.errors import ConvergenceError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, EndReason
@@ -283,15 +282,10 @@ def differences(one: Diagram, other: Diagram) -> Iterator[str]:
 
 
 def _lacks_event(diagram: Diagram, event: Bifurcation, one: Diagram) -> bool:
-    """Tell whether a diagram has not an event of another one, nor an endless period that it is lost in."""
-    if any(_same_bifurcation(event, b, one.parameter, one.width) for b in diagram.bifurcations):
-        return False
-    return not any(_is_at(event, node, diagram) for node in diagram.events) and not any(
-        lost_in_end(event, branch[-side], one.parameter, one.width)
-        for branch in diagram.branches
-        for side, end in enumerate(branch.ends)
-        if end.reason is EndReason.PERIOD
-    )
+    """Tell whether a diagram has not an event of another one."""
+    return not any(
+        _same_bifurcation(event, b, one.parameter, one.width) for b in diagram.bifurcations
+    ) and not any(_is_at(event, node, diagram) for node in diagram.events)
 
 
 def _lacks_branch(diagram: Diagram, branch: Branch, one: Diagram) -> bool:

@@ -207,7 +207,7 @@ def certify_branch(
     until : when to end, by ``time.time``; what is left then is listed as such
     progress : called with one line of text now and then
     points : certificates of its printed orbits, if they are known. If not, all but their inequalities is
-        proved first; those hold in the tube, and are looked at where there is none. With a time limit they
+        proved first; those hold in the tube, and are looked at where there is no tube. With a time limit they
         may not come to it, so that all of an orbit is proved first.
 
     Raises

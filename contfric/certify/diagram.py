@@ -106,6 +106,7 @@ def certify_diagram(
         _branch_summary(i + 1, branch, found.get(len(nodes) + k))
         for k, (i, branch) in enumerate(branches)
     ]
+    parts, same = told_apart(part for some, _ in written.values() for part in some)
     return DiagramCertificate(
         diagram.model.name,
         diagram.parameter,
@@ -115,9 +116,10 @@ def certify_diagram(
         time.time() - began,
         ended,
         (
-            *told_apart(part for parts, _ in written.values() for part in parts),
+            *parts,
             *(tube for k in sorted(results) for tube in results[k].tubes),
         ),
+        tuple(part["params"][diagram.parameter] for part in same),
     )
 
 

@@ -139,6 +139,9 @@ class DiagramCertificate(Shown):
         What ended the run before all was tried (a time limit, an interrupt); empty if nothing did.
     checkable : tuple of dict
         Certificates of events, printed orbits and tubes as plain data, which ``contfric verify`` checks.
+    same : tuple of float
+        Values of the parameter of printed orbits that are not checkable: in all digits they are those of
+        another branch, which meets theirs at an event.
     """
 
     model: str
@@ -149,6 +152,7 @@ class DiagramCertificate(Shown):
     seconds: float
     ended: str = ""
     checkable: tuple[dict[str, Any], ...] = ()
+    same: tuple[float, ...] = ()
 
     @property
     def covered(self) -> float:
@@ -181,11 +185,14 @@ class DiagramCertificate(Shown):
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """The same events with their parameter, and why the file has no certificate of them."""
-        return tuple(
+        """What is proved and has no certificate in the file, with the parameter and the reason."""
+        events = (
             f"{e.label} at {self.parameter} = {e.printed:.12g}: {e.unchecked}"
             for e in self._unchecked
         )
+        why = "the checker does not tell it from one of another branch"
+        orbits = (f"an orbit at {self.parameter} = {value:.12g}: {why}" for value in self.same)
+        return (*events, *orbits)
 
     @property
     def _unchecked(self) -> list[EventSummary]:
@@ -303,6 +310,7 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
             EventSummary(**{**e, "branches": tuple(e["branches"])}) for e in data.pop("events")
         )
         low, high = data.pop("range")
+        data["same"] = tuple(data.get("same", ()))
         return DiagramCertificate(
             branches=branches, events=events, range=(low, high), checkable=checkable, **data
         )

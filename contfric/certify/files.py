@@ -167,26 +167,29 @@ def checkable(proofs: Iterable[Certificate | EventCertificate | None]) -> list[d
     return [part for part in found if part is not None]
 
 
-def told_apart(parts: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the parts of a file without orbits that the checker does not tell from one before them.
+def told_apart(
+    parts: Iterable[dict[str, Any]],
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the parts that a file can have, and the orbits that the checker does not tell from one of these.
 
     At an event orbits of two branches meet, and at its printed parameters they may be one to all digits.
     """
-    kept: list[dict[str, Any]] = []
+    kept, same = list[dict[str, Any]](), list[dict[str, Any]]()
     orbits: dict[tuple[tuple[str, float], ...], list[dict[str, Any]]] = {}
     for part in parts:
         if part["certificate"] == "orbit":
             there = orbits.setdefault(tuple(sorted(part["params"].items())), [])
             pairs = ({"certificate": "diagram", "checkable": [one, part]} for one in there)
             if not all(check_text(json.dumps(pair)).yes for pair in pairs):
+                same.append(part)
                 continue
             there.append(part)
         kept.append(part)
-    return kept
+    return kept, same
 
 
 def left_out(path: Any) -> list[str]:
-    """Return the events that a file does not have although they are proved, each with the reason.
+    """Return the events and orbits that a file does not have although they are proved, each with the reason.
 
     Older files do not say.
     """

@@ -31,7 +31,6 @@ from contfric.bvp.system import EventFunction, Itinerary, Margin, build_system
 from contfric.errors import NotationError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
 from contfric.events.locations import TANGENTIAL, locations_of, normal_location
-from contfric.events.narrow_strips import is_same, regular_outcomes
 from contfric.events.outcomes import (
     NO_LENGTH_AT_TOUCH,
     RestsForEver,
@@ -46,7 +45,6 @@ from contfric.orbit.samples import state_within
 from contfric.orbit.section_joints import divided
 from contfric.orbit.sections import named_by_ends
 from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
-from contfric.orbit.solve import refine
 from contfric.signature.edits import checked_itinerary, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.
@@ -236,19 +234,6 @@ class _Collection:
             locations = [p for p in vanishing(orbit, self.least) if p[0].segment < count]
             away = np.concatenate([form.away, form.away]) if self.unit.half else form.away
             self.edit(orbit, frozenset({form.itinerary}), away, form.reason, locations)
-            self.cross(orbit, form)
-
-    def cross(self, orbit: Orbit, form: Form) -> None:
-        """Add the regular forms at both edges of a strip that a hold crosses in no time."""
-        for passed in regular_outcomes(orbit, len(form.itinerary)):
-            try:
-                edited, _ = edited_whole(orbit, passed)
-                solved = refine(edited)
-                if is_same(orbit, solved, self.least):
-                    text = "; ".join(filter(None, (form.reason, passed[0].reason)))
-                    self.take(solved, np.zeros(len(solved.itinerary)), text)
-            except NotationError:
-                continue  # there is no such itinerary
 
     def edit(
         self,

@@ -217,3 +217,36 @@ def test_cycles_around_a_centre(tmp_path, seed: int) -> None:
         v**2 / 2 + k * x**2 / 2 + a * x**3 / 3 + b * x**4 / 4 for x, v in branch.joints[:, 0, 1:]
     ]
     assert np.ptp(energy) > 0.1 * np.median(energy)
+
+
+@pytest.mark.parametrize(
+    ("params", "bounds"),
+    [
+        (
+            {
+                "Omega": 0.08522782883656335,
+                "S": 0.040571679038123705,
+                "S0": 0.04057323566406074,
+                "h": -0.37243437908184646,
+                "zeta": 0.0,
+            },
+            (0.07500048937617575, 0.09545516829695096),
+        ),
+        (
+            {
+                "Omega": 0.14409300575820697,
+                "S": 0.14582794342466832,
+                "S0": 0.14583149445942145,
+                "h": -0.2200274355109686,
+                "zeta": 0.01,
+            },
+            (0.12680184506722214, 0.1613841664491918),
+        ),
+    ],
+)
+def test_symmetric_orbits_next_to_a_family_are_solved_on_their_half(
+    params: dict[str, float], bounds: tuple[float, float]
+) -> None:
+    """Whichever of the two equal lengths of a segment rounding makes the shorter one."""
+    found = cf.explore(cf.find_orbit("coulomb", params, longest=1000), "Omega", bounds)
+    assert all(restart.complete for restart in found.verify(3).restarts)

@@ -182,7 +182,7 @@ def _farther(
 
 
 def _farthest(orbit: Orbit, point: Point, side: Point, apart: float, settings: Settings) -> Point:
-    """Return the farthest point found on one side of another one; the side itself if there is none."""
+    """Return the farthest point found on one side of another one; else the side itself."""
     near = point.arc - side.arc
     while apart > abs(near):
         found = point_before(orbit, point, float(np.copysign(apart, near)), settings)
