@@ -104,7 +104,7 @@ class _Parabola:
 
 
 def _parabola(orbit: Orbit, phi: FloatArray, settings: Settings) -> _Parabola | None:
-    """Return the branch along a null vector as a parabola; None if it is none where its bend is told from."""
+    """Return the branch along a null vector as a parabola; None if it is no parabola that near."""
     value = settings_value(orbit, settings)
     found = []
     for distance in (_BEND, _NEARER * _BEND):
@@ -143,7 +143,7 @@ def leave_short(state: Exploration, orbit: Orbit, event: Event, end: EndReason, 
 def follow_short(state: Exploration, candidate: Candidate, event: Event) -> bool | None:
     """Take a short branch that ends at an event for what follows it.
 
-    None if there is none, else whether it is another one than the branch that arrives.
+    None if no branch is found, else whether it is another one than the branch that arrives.
     """
     assert candidate.orbit is not None
     short = short_branch_to(candidate.orbit, state.settings, event)

@@ -238,7 +238,7 @@ def write_data(data: dict[str, Any], path: Any) -> None:
 
 
 def _what_else(text: str) -> str:
-    """Return why a text is none of the certificates that the checker knows; nothing if it is one."""
+    """Return why a text is not one of the certificates that the checker knows; nothing if it is one."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError):

@@ -154,7 +154,7 @@ class _Gathered:
 
 
 def _diagram(tile: EnsembleTile, vector: FloatArray) -> Diagram | ContfricError:
-    """Return the diagram of a sample, or why there is none."""
+    """Return the diagram of a sample, or why there is no diagram."""
     try:
         tile.model.check_params(tile.model.mapping(vector))
     except ParameterError as error:
@@ -178,7 +178,7 @@ def _start(tile: EnsembleTile, vector: FloatArray) -> Orbit:
     Raises
     ------
     ConvergenceError
-        If there is none at any of the values that are tried: the error of the first.
+        If there is no orbit at any of the values that are tried: the error of the first.
     """
     (low, high), params = tile.range, tile.model.mapping(vector)
     others = low + (high - low) * np.mod(_GOLDEN * np.arange(1, _STARTS), 1.0)

@@ -109,7 +109,7 @@ class EquilibriumBranch(Tabled):
         Raises
         ------
         ParameterError
-            If there is none of that name.
+            If there is no such name.
         """
         names = self.model.states
         if name is not None and name not in names:

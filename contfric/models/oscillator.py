@@ -110,7 +110,7 @@ class OscillatorModel:
     units: ClassVar[Mapping[str, float] | str] = {}
 
     def period(self, p: Symbols) -> Any:
-        """Return the period of the excitation; None (as here) if there is none."""
+        """Return the period of the excitation; None (as here) without one."""
         return None
 
     def observables(self, t: Any, y: Symbols, p: Symbols) -> Mapping[str, Any]:

@@ -1,4 +1,4 @@
-"""A section where there is none: orbits along which nothing happens, in a model that is excited.
+"""A section where no surface is met: orbits along which nothing happens, in a model that is excited.
 
 An orbit needs a joint. One that stays in one mode (below a grazing, off a wall, pressed against it all the
 time) has none, unless a surface divides that mode. So each mode in which an orbit may stay is divided by the

@@ -71,7 +71,7 @@ def passed_domains(model: Model, start: str, end: str, crossed: list[str]) -> li
 
 
 def _shortest_walk(model: Model, start: str, end: str) -> list[str]:
-    """Return the shortest walk between two domains of one mode; both ends if there is none."""
+    """Return the shortest walk between two domains of one mode; both ends without one."""
     mode = model.domain_by_name[start].mode
     waiting = deque([[start]])
     seen = {start}

@@ -105,7 +105,7 @@ def _growing(
 
 
 def _of_one_sign(columns: FloatArray) -> FloatArray:
-    """Return a combination of columns without negative elements, whose sum is 1; zeros if there is none.
+    """Return a combination of columns without negative elements, whose sum is 1; zeros without one.
 
     Examples
     --------

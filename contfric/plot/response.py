@@ -59,7 +59,7 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
 def draw_overlay(
     axes: Sequence[Axes], rows: Sequence[QuantityLike], parameter: str, overlay: Sweep | None
 ) -> None:
-    """Draw the points of a sweep after the rows of a diagram; nothing if there is none.
+    """Draw the points of a sweep after the rows of a diagram; nothing without a sweep.
 
     Raises
     ------

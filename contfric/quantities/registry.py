@@ -162,7 +162,7 @@ def number_quantity(asked: Any, model: Model, what: str) -> Quantity:
     Raises
     ------
     ParameterError
-        If there is none, or it is a list of numbers.
+        If there is no such quantity, or it is a list of numbers.
     """
     if not isinstance(asked, str) and not callable(asked):
         raise ParameterError(

@@ -76,7 +76,7 @@ class Returns(Tabled):
         Raises
         ------
         ParameterError
-            If there is none of that name.
+            If there is no such name.
         """
         if name == "t":
             return self.times

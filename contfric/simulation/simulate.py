@@ -185,7 +185,7 @@ def simulate(
     model, params : the model (or its name) and its parameters; defaults fill in
     state : initial state, shape (n,); by default the model's rest position shifted by its spread
     time : initial time, nondimensional
-    periods : time to follow, in periods of the excitation or of the clock (units of time if there is none)
+    periods : time to follow, in periods of the excitation or of the clock (units of time without either)
     events : most events to follow
     domain : initial domain, where the state alone does not decide
     progress : called with one line of text now and then

@@ -65,7 +65,7 @@ class Study:
 
     @property
     def title(self) -> str:
-        """The title, or the name if there is none."""
+        """The title, or the name of a study without title."""
         return self.content.title or self.name
 
     @property

@@ -5,7 +5,7 @@ For ``G(x) = 0`` with Jacobian J, a box ``X = c +- r`` and any matrix C,
     K = c - C G(c) + (I - C J(X)) (X - c) .
 
 If K lies in the interior of X, there is exactly one zero in X, it lies in K, and every matrix in J(X) is
-regular. If K and X are disjoint there is none. (R. Krawczyk, Computing 4 (1969) 187-201; S. M. Rump,
+regular. If K and X are disjoint there is no zero. (R. Krawczyk, Computing 4 (1969) 187-201; S. M. Rump,
 Acta Numerica 19 (2010) 287-449, theorem 13.3.) C is an approximate inverse of J(c); nothing depends on how
 good it is, but whether the proof succeeds.
 """
@@ -110,7 +110,7 @@ def _weighted(values: Vector, radii: Vector) -> arb:
 def narrowed(
     residual: Callable[[Vector], Vector], found: Inclusion, centre: Vector, radii: Vector
 ) -> Vector | None:
-    """Return a narrow enclosure of the only zero of a box, from residuals alone; None if there is none.
+    """Return a narrow enclosure of the only zero of a box, from residuals alone; None if there is no zero.
 
     For c in the box, ``x - c = (I - C J)(x - c) - C G(c)`` with J in the Jacobians of the box. In the norm
     in which that is the unit ball, ``|x - c| <= |C G(c)| / (1 - share)``.

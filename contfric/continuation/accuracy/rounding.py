@@ -102,7 +102,7 @@ class Estimate:
         return max(LEAST, self.least, error / self.width)
 
     def _error(self) -> tuple[float | None, float]:
-        """Return the error, and what is claimed if there is none."""
+        """Return the error, and what is claimed where it is not known."""
         kind, here, active = self.kind, self.here, self.here.model.index_of(self.parameter)
         if self.tests:
             return self._at_most(self._of_margins(active)), _SINGULAR

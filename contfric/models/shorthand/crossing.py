@@ -261,7 +261,7 @@ class _Limits:
         self.levels: dict[str, list[tuple[str, Any]]] = {}
 
     def _surface(self, observable: str, formula: Any, level: Any) -> str:
-        """Return the name of the surface of an observable at a level; a new one where there is none yet."""
+        """Return the name of the surface of an observable at a level; a new one if needed."""
         known = self.levels.setdefault(observable, [])
         for name, other in known:
             if sympy.simplify(level - other) == 0:

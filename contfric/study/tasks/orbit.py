@@ -86,7 +86,7 @@ class Start(Task):
         return "" if study.task else points_text(study)
 
     def skipped(self, study: Study) -> Iterator[Skipped]:
-        """Yield the simulation, if there is none."""
+        """Yield the simulation, where the study has another start."""
         if self.simulate is None:
             origin = "a saved orbit" if study.orbit is not None else "a signature"
             yield Skipped("simulation to a steady state", f"the start is {origin}")
