@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from contfric.adding.windows import period_adding as period_adding
     from contfric.atlas.diagram import Diagram as Diagram
     from contfric.atlas.explore import explore as explore
-    from contfric.atlas.plane import Plane as Plane
-    from contfric.atlas.plane_explore import explore_plane as explore_plane
-    from contfric.atlas.seeds import Seeds as Seeds
+    from contfric.atlas.plane.explore import explore_plane as explore_plane
+    from contfric.atlas.plane.plane import Plane as Plane
+    from contfric.atlas.starts.seeds import Seeds as Seeds
     from contfric.censuses.census import census as census
     from contfric.censuses.result import Census as Census
     from contfric.certify.census import certify_census as certify_census

@@ -3,8 +3,8 @@
 ``python benchmarks/stress/restarts.py --count 3000 --seed 1 --workers 2 --out restarts.json``
 
 Each restart has 0.31 times the step. What differs is counted by class. The classes that are excused are
-fixed here by the scene, and in :mod:`contfric.atlas.degenerate` by the events. Each excuses what differs at
-its values of the parameter, or is joined by these alone; everything else is a fault.
+fixed here by the scene, and in :mod:`contfric.atlas.completeness.degenerate` by the events. Each excuses
+what differs at its values of the parameter, or is joined by these alone; everything else is a fault.
 Points are asked for admissibility, and sums of indices are tested.
 """
 
@@ -22,8 +22,8 @@ from report import Tally
 from scenes import time_limit
 
 import contfric as cf
-from contfric.atlas.degenerate import Degenerate
-from contfric.atlas.verification import Verification, verify
+from contfric.atlas.completeness.degenerate import Degenerate
+from contfric.atlas.completeness.verification import Verification, verify
 
 WHAT = "Diagrams of random scenes in all five parameters, explored again from up to six of their branches."
 #: Longest that one scene may take with its restarts (s of processor time); longer ones are counted as cut.

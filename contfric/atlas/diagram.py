@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from contfric.atlas.completeness.verification import Verification
     from contfric.atlas.scenario import Scenario
-    from contfric.atlas.verification import Verification
     from contfric.certify.diagram_certificate import DiagramCertificate
     from contfric.plot.live.frame import Frame
     from contfric.plot.live.serve import Live
@@ -190,7 +190,7 @@ class Diagram(Shown):
         >>> cf.explore(orbit, "Omega", (0.48, 0.55)).verify(restarts=2).passed
         True
         """
-        from contfric.atlas.verification import STEP, verify
+        from contfric.atlas.completeness.verification import STEP, verify
 
         found = verify(self, restarts, STEP if step is None else step)
         object.__setattr__(self, "verification", found)

@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from contfric.atlas.collect import collect
-from contfric.atlas.departures import foresee_departures
 from contfric.atlas.diagram import Asked, Diagram
 from contfric.atlas.exploration import Exploration, Progress
 from contfric.atlas.follow import follow
-from contfric.atlas.leaving_event import settings_for
-from contfric.atlas.one_mode import with_section
-from contfric.atlas.seeds import Seeds, attractors
+from contfric.atlas.leaving.departures import foresee_departures
+from contfric.atlas.leaving.short_branches import begins_at_short
+from contfric.atlas.leaving.trace_away import settings_for
 from contfric.atlas.shared_rests import shared_rest
-from contfric.atlas.short_branches import begins_at_short
+from contfric.atlas.starts.one_mode import with_section
+from contfric.atlas.starts.seeds import Seeds, attractors
 from contfric.base.attributes import altered
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch

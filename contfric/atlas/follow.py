@@ -14,29 +14,29 @@ from dataclasses import replace
 from itertools import chain
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossings import follow_crossing, whole_branch
-from contfric.atlas.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.families import (
+from contfric.atlas.leaving.crossings import follow_crossing, whole_branch
+from contfric.atlas.leaving.departures import NO_WIDTH, ends_at, follow_departure
+from contfric.atlas.leaving.families import (
     SHARES,
     follow_beside_family,
     follow_family_at,
     meets,
     solved_next_to,
 )
-from contfric.atlas.faults import fault_of, fault_of_itinerary
-from contfric.atlas.folds import follow_arms
-from contfric.atlas.leaving_event import (
+from contfric.atlas.leaving.faults import fault_of, fault_of_itinerary
+from contfric.atlas.leaving.folds import follow_arms
+from contfric.atlas.leaving.many_contacts import GOES_ON, composes, goes_on, in_order
+from contfric.atlas.leaving.short_branches import follow_short
+from contfric.atlas.leaving.splitting import follow_split
+from contfric.atlas.leaving.trace_away import (
     from_admissible,
     leave_event,
     leave_singular,
     may_have_passed,
     settings_for,
 )
-from contfric.atlas.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
-from contfric.atlas.short_branches import follow_short
-from contfric.atlas.splitting import follow_split
 from contfric.bvp.conserved import conserved
 from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch

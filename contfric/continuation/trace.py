@@ -3,8 +3,8 @@
 At a corner two branches of one itinerary meet, and a march goes on from one to the other. At the end of a
 continuum (Omega = 1/2, no damping) a margin falls to zero along one branch, and grows again along another
 one of the same itinerary: the equations left over begin with a quadratic form, of which each is one line
-(:mod:`contfric.atlas.families`). No test changes its sign there. Newton's method sees a hyperbola that is
-as wide as rounding makes it, and steps that are short enough turn with it. What is smooth turns in
+(:mod:`contfric.atlas.leaving.families`). No test changes its sign there. Newton's method sees a hyperbola
+that is as wide as rounding makes it, and steps that are short enough turn with it. What is smooth turns in
 proportion to the step.
 """
 

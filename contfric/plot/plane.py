@@ -33,7 +33,7 @@ from contfric.plot.style import (
 )
 
 if TYPE_CHECKING:
-    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane.plane import Plane
     from contfric.curves.curve import Curve
     from contfric.curves.quantity_curve import QuantityCurve
     from contfric.curves.special import SpecialPoint

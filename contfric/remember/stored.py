@@ -26,6 +26,12 @@ _RENAMED = {
 }
 #: Modules that classes had when files were written, and have now.
 _MOVED = {
+    "contfric.atlas.balance": "contfric.atlas.completeness.balance",
+    "contfric.atlas.degenerate": "contfric.atlas.completeness.degenerate",
+    "contfric.atlas.plane": "contfric.atlas.plane.plane",
+    "contfric.atlas.plane_regions": "contfric.atlas.plane.regions",
+    "contfric.atlas.seeds": "contfric.atlas.starts.seeds",
+    "contfric.atlas.verification": "contfric.atlas.completeness.verification",
     "contfric.continuation.events": "contfric.events.bifurcation",
     "contfric.continuation.measured_event": "contfric.events.measured_event",
     "contfric.orbit.holds": "contfric.bvp.holds",

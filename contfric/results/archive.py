@@ -27,7 +27,7 @@ from contfric.results.codec import Arrays, ResultReader, ResultWriter
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
-    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane.plane import Plane
     from contfric.chaos.map import LyapunovMap
     from contfric.continuation.branch import Branch
     from contfric.curves.curve import Curve

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
-from contfric.atlas.plane import Plane
+from contfric.atlas.plane.plane import Plane
 from contfric.base.tabled import Tabled
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch

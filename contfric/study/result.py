@@ -14,7 +14,7 @@ from contfric.study.tasks.branch import ContinueTask
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram
-    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane.plane import Plane
     from contfric.chaos.map import LyapunovMap
     from contfric.continuation.branch import Branch
     from contfric.curves.extremum import ExtremumCurve

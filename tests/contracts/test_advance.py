@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import departures
 from contfric.atlas.collect import Event
-from contfric.atlas.departures import foresee_departures
+from contfric.atlas.leaving import departures
+from contfric.atlas.leaving.departures import foresee_departures
 from contfric.base.counts import Counts, counts
 from contfric.base.tally import tally
 from contfric.events.bifurcation import Kind

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.plane_sections import sections_of
+from contfric.atlas.plane.sections import sections_of
 from contfric.base.extras import MissingPackageError
 from contfric.curves.ranges import box_of
 

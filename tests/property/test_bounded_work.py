@@ -15,7 +15,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas import follow
-from contfric.atlas.crossings import whole_branch
+from contfric.atlas.leaving.crossings import whole_branch
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings, settings_of
 from contfric.curves.points import solve_point

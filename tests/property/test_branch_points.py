@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.crossings import whole_branch
+from contfric.atlas.leaving.crossings import whole_branch
 from contfric.atlas.matching import on_branch
 from contfric.continuation.ends.at_vertices import stalled_at
 from contfric.continuation.half_branch import first_point

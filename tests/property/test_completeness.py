@@ -15,7 +15,7 @@ import restarts
 from report import Tally
 
 import contfric as cf
-from contfric.atlas.verification import differences
+from contfric.atlas.completeness.verification import differences
 from contfric.events.conditions import possible, relation_of
 from contfric.events.incident import incident_forms
 from contfric.events.sequences import count, lengths, necklaces

@@ -15,9 +15,9 @@ import restarts
 from report import Tally
 
 import contfric as cf
-from contfric.atlas.balance import _solved_at
+from contfric.atlas.completeness.balance import _solved_at
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.faults import fault_of
+from contfric.atlas.leaving.faults import fault_of
 from contfric.continuation.accuracy.moved_by_errors import duration_error
 from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.located_event import ROUGH

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.verification import differences
+from contfric.atlas.completeness.verification import differences
 from contfric.continuation.families.continuum import in_continuum, is_continuum
 
 #: Scenes with no sticks: a large excitation against friction, drawn at random.

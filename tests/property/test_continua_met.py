@@ -7,7 +7,7 @@ import pytest
 import restarts
 
 import contfric as cf
-from contfric.atlas import crossings
+from contfric.atlas.leaving import crossings
 from contfric.continuation.trace import follow_orbit
 
 

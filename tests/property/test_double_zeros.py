@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.verification import STEP
+from contfric.atlas.completeness.verification import STEP
 from contfric.bvp.system import Margin
 
 #: Scenes with a bridge after a touch of the limit inside of a stick: what varies, where, its parameters.

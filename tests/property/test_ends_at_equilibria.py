@@ -14,7 +14,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas import matching
-from contfric.atlas.verification import differences
+from contfric.atlas.completeness.verification import differences
 from contfric.bvp.system import build_system
 from contfric.orbit.repetition import shortest
 from tests.property.test_fast_cycles import welander

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from contfric.atlas.degenerate import _ALIKE, _alike
+from contfric.atlas.completeness.degenerate import _ALIKE, _alike
 from contfric.base.arrays import FloatArray
 from contfric.events.sequences import necklaces
 from contfric.orbit.slides import Outline

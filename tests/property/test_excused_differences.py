@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import verification
-from contfric.atlas.degenerate import Degenerate, joined_surely
-from contfric.atlas.verification import _told_apart
+from contfric.atlas.completeness import verification
+from contfric.atlas.completeness.degenerate import Degenerate, joined_surely
+from contfric.atlas.completeness.verification import _told_apart
 
 sys.path.insert(0, FOLDER := str(Path(__file__).parents[2] / "benchmarks" / "stress"))
 from restarts import Scene, excuses

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.verification import STEP, differences
+from contfric.atlas.completeness.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation import events_of_step as resolve
 from contfric.continuation.locating import smooth

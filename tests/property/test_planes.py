@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import follow, plane_explore
+from contfric.atlas import follow
+from contfric.atlas.plane import explore as plane_explore
 
 
 def explored(params: dict[str, float], ranges: dict[str, tuple[float, float]]) -> cf.Plane:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.verification import STEP, differences
+from contfric.atlas.completeness.verification import STEP, differences
 from contfric.base.attributes import altered
 from contfric.continuation.half_branch import point_before
 from contfric.continuation.locating import smooth

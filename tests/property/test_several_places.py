@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.several_locations import Opening, opening_together
+from contfric.atlas.leaving.several_locations import Opening, opening_together
 from contfric.events.bifurcation import TERMINAL
 from contfric.events.candidates import sequences_of
 from contfric.events.incident import Incident, incident_forms

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.balance import balances, index_sums
-from contfric.atlas.verification import STEP, differences
+from contfric.atlas.completeness.balance import balances, index_sums
+from contfric.atlas.completeness.verification import STEP, differences
 from contfric.continuation.points import LARGEST_STEP
 
 BOUNDS = (0.4, 0.6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas.families import solved_next_to
+from contfric.atlas.leaving.families import solved_next_to
 from contfric.continuation.points import settings_of
 from contfric.events.candidates import candidates
 

@@ -24,7 +24,7 @@ from contfric.study.tasks.task import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from contfric.atlas.plane import Plane
+    from contfric.atlas.plane.plane import Plane
     from contfric.study.drawings import Drawing
     from contfric.study.read import Study
 
@@ -96,7 +96,7 @@ class PlaneTask(Task):
 
     def compute(self, job: Job) -> Plane:
         """Explore a plane; on Ctrl-C what was found so far, with ``complete`` False."""
-        from contfric.atlas.plane_explore import explore_plane
+        from contfric.atlas.plane.explore import explore_plane
 
         return explore_plane(
             job.found["orbit"],

@@ -278,7 +278,7 @@ class SeedsEntry(SchemaPart):
 
     def argument(self) -> dict[str, Any]:
         """Return the argument ``seeds`` of an exploration."""
-        from contfric.atlas.seeds import Seeds
+        from contfric.atlas.starts.seeds import Seeds
 
         return {"seeds": Seeds(**self.model_dump())}
 

@@ -7,9 +7,9 @@ the orbits of the other side are looked for next to the event.
 from __future__ import annotations
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossings import whole_branch
-from contfric.atlas.departures import ends_at
 from contfric.atlas.exploration import Exploration
+from contfric.atlas.leaving.crossings import whole_branch
+from contfric.atlas.leaving.departures import ends_at
 from contfric.continuation.points import next_to
 from contfric.events.bifurcation import Decision, Kind
 from contfric.events.split_touch import pinned_first, splits

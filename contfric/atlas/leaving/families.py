@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.faults import fault_of
+from contfric.atlas.leaving.crossings import whole_branch
+from contfric.atlas.leaving.faults import fault_of
 from contfric.atlas.matching import SAME_SOLUTION, stops_apart
 from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.families.vertical import family_near

@@ -8,10 +8,10 @@ from itertools import chain
 import numpy as np
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossing_directions import ways_in_plane
 from contfric.atlas.exploration import Exploration, Progress
+from contfric.atlas.leaving.crossing_directions import ways_in_plane
+from contfric.atlas.leaving.several_locations import opening_together
 from contfric.atlas.matching import SAME_SOLUTION
-from contfric.atlas.several_locations import opening_together
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.continuation.assembly import assemble

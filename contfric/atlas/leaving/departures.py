@@ -7,9 +7,9 @@ from itertools import chain
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import first_end, settings_for, went_somewhere
+from contfric.atlas.leaving.short_branches import leave_short
+from contfric.atlas.leaving.trace_away import first_end, settings_for, went_somewhere
 from contfric.atlas.matching import same_event
-from contfric.atlas.short_branches import leave_short
 from contfric.continuation.assembly import assemble
 from contfric.continuation.events_of_step import violates
 from contfric.continuation.half_branch import Side

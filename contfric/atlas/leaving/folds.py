@@ -8,9 +8,9 @@ bridge may be the shorter one, and the other one the longer.
 from __future__ import annotations
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import first_end, settings_for
+from contfric.atlas.leaving.crossings import whole_branch
+from contfric.atlas.leaving.trace_away import first_end, settings_for
 from contfric.continuation.assembly import assemble
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point

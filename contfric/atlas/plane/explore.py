@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.atlas.plane import Plane
-from contfric.atlas.plane_matching import at_once, is_known, twins_of
-from contfric.atlas.plane_regions import regions_of
-from contfric.atlas.plane_sections import section_diagram, sections_of
-from contfric.atlas.plane_state import PlaneExploration, Progress
-from contfric.atlas.seeds import Seeds
+from contfric.atlas.plane.known_curves import at_once, is_known, twins_of
+from contfric.atlas.plane.plane import Plane
+from contfric.atlas.plane.regions import regions_of
+from contfric.atlas.plane.sections import section_diagram, sections_of
+from contfric.atlas.plane.state import PlaneExploration, Progress
+from contfric.atlas.starts.seeds import Seeds
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.curves.after_event import Start
 from contfric.curves.assembly import join_sides

@@ -8,7 +8,7 @@ import numpy as np
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import settings_for
+from contfric.atlas.leaving.trace_away import settings_for
 from contfric.base.arrays import FloatArray
 from contfric.continuation.branch import Branch
 from contfric.continuation.points import FIRST_STEP, Settings

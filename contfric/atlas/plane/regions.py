@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.matching import identity_of
-from contfric.atlas.plane import Family, Region
+from contfric.atlas.plane.plane import Family, Region
 from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import held_back
 from contfric.bvp.system import Itinerary

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.atlas.leaving.short_branches import is_short
 from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
-from contfric.atlas.short_branches import is_short
 from contfric.bvp.conserved import conserved
 from contfric.bvp.margins import EventFunction
 from contfric.continuation.branch import Branch

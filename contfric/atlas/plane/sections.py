@@ -9,8 +9,8 @@ import numpy as np
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
-from contfric.atlas.plane_state import PlaneExploration
-from contfric.atlas.seeds import Seeds
+from contfric.atlas.plane.state import PlaneExploration
+from contfric.atlas.starts.seeds import Seeds
 from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.curves.ranges import PlaneRanges

@@ -20,10 +20,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.atlas.balance import Balance, IndexSum, balances, index_sums
-from contfric.atlas.degenerate import Degenerate, degenerate_events, joined_surely, unresolved
+from contfric.atlas.completeness.balance import Balance, IndexSum, balances, index_sums
+from contfric.atlas.completeness.degenerate import (
+    Degenerate,
+    degenerate_events,
+    joined_surely,
+    unresolved,
+)
+from contfric.atlas.leaving.short_branches import is_short
 from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_location
-from contfric.atlas.short_branches import is_short
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.points import LARGEST_STEP

@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.atlas.collect import Event
-from contfric.atlas.crossings import whole_branch
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving_event import first_end, settings_for, where
+from contfric.atlas.leaving.crossings import whole_branch
+from contfric.atlas.leaving.trace_away import first_end, settings_for, where
 from contfric.atlas.matching import same_event, same_kind, same_location
 from contfric.base.arrays import FloatArray
 from contfric.base.interrupts import whole

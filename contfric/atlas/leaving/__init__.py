@@ -1,0 +1,1 @@
+"""What leaves an event: which orbits, on which side of it, and at how small a distance."""

@@ -1,0 +1,1 @@
+"""Where an exploration starts: attractors of simulations, and orbits inside one mode."""
