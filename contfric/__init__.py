@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from contfric.continuation.branch import Branch as Branch
     from contfric.continuation.trace import continue_orbit as continue_orbit
     from contfric.curves.curve import Curve as Curve
-    from contfric.curves.extremum import ExtremumCurve as ExtremumCurve
-    from contfric.curves.extremum import continue_extremum as continue_extremum
-    from contfric.curves.homoclinic import HomoclinicCurve as HomoclinicCurve
-    from contfric.curves.homoclinic import continue_homoclinic as continue_homoclinic
-    from contfric.curves.quantity_curve import QuantityCurve as QuantityCurve
-    from contfric.curves.quantity_trace import continue_quantity as continue_quantity
+    from contfric.curves.of_quantities.curve import QuantityCurve as QuantityCurve
+    from contfric.curves.of_quantities.extremum import ExtremumCurve as ExtremumCurve
+    from contfric.curves.of_quantities.extremum import continue_extremum as continue_extremum
+    from contfric.curves.of_quantities.homoclinic import HomoclinicCurve as HomoclinicCurve
+    from contfric.curves.of_quantities.homoclinic import continue_homoclinic as continue_homoclinic
+    from contfric.curves.of_quantities.trace import continue_quantity as continue_quantity
     from contfric.curves.special import CodimTwo as CodimTwo
     from contfric.curves.trace import continue_bifurcation as continue_bifurcation
     from contfric.ensembles.compute import ensemble as ensemble

@@ -16,9 +16,9 @@ import numpy as np
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import EXTRA, Point, PointRows
-from contfric.curves.births import is_simpler
-from contfric.curves.meeting import has_multiplier
-from contfric.curves.naming import MARGINAL
+from contfric.curves.codimension_two.births import is_simpler
+from contfric.curves.codimension_two.meeting import has_multiplier
+from contfric.curves.codimension_two.naming import MARGINAL
 from contfric.curves.points import first_curve_point, march_rows
 from contfric.curves.problem import Problem, problem_of, tangency
 from contfric.curves.ranges import PlaneRanges
@@ -65,7 +65,7 @@ def _tangent_at(orbit: Orbit, test: EventFunction) -> EventFunction:
     ParameterError
         If there is no tangency in the segment.
     """
-    from contfric.curves.conditions import JOINT, START
+    from contfric.curves.equations.conditions import JOINT, START
 
     location, segment, surface = tangency(orbit, test)
     if location == START:  # the joint is the end of the segment before it

@@ -8,9 +8,9 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.continuation.points import Point
-from contfric.curves.births import birth_between
-from contfric.curves.locating import CurveStep, by_location
-from contfric.curves.naming import crossings
+from contfric.curves.codimension_two.births import birth_between
+from contfric.curves.codimension_two.locating import CurveStep, by_location
+from contfric.curves.codimension_two.naming import crossings
 from contfric.curves.problem import Problem
 from contfric.curves.special import CurveEnd, CurveEndReason, SpecialPoint
 

@@ -31,7 +31,7 @@ from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import Point
 from contfric.continuation.singular_points.vertices import symmetric_part, undoubled_part
 from contfric.curves.after_event import Start, itineraries_at, prove, starts_of
-from contfric.curves.births import simpler_problem
+from contfric.curves.codimension_two.births import simpler_problem
 from contfric.curves.curve import CurvePart
 from contfric.curves.points import solve_point
 from contfric.curves.problem import Problem, border_of, problem_of

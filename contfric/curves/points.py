@@ -20,9 +20,9 @@ from contfric.curves.special import CurveEndReason
 from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
-    from contfric.curves.conditions import Condition
-    from contfric.curves.correct import CurveProblem
-    from contfric.curves.held_conditions import Conditions
+    from contfric.curves.core.correct import CurveProblem
+    from contfric.curves.equations.conditions import Condition
+    from contfric.curves.equations.held_conditions import Conditions
 
 #: Points that are marched at a time: limits of the parameters are looked at after each.
 CHUNK = 128
@@ -62,7 +62,7 @@ class Conditioned(Protocol):
 
 def compiled_problem(problem: Conditioned) -> CurveProblem:
     """Return a problem as the compiled engine takes it."""
-    from contfric.curves.correct import CurveProblem
+    from contfric.curves.core.correct import CurveProblem
 
     system = problem.system
     second, widths = system.model.flow.second_derivatives, problem.box.widths
@@ -85,7 +85,7 @@ def march_rows(
     from contfric.continuation.core.geometry import Course
     from contfric.continuation.core.march import BUDGET, MORE
     from contfric.continuation.core.steps import AT_EVENT
-    from contfric.curves.march import march_curve
+    from contfric.curves.core.march import march_curve
 
     compiled, box, counts = compiled_problem(problem), problem.box, tally()
     corners, (start_z, start_w) = np.array([box.low, box.high, box.widths]), start.as_start()

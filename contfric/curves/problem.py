@@ -23,8 +23,8 @@ from contfric.orbit.orbit import Orbit
 from contfric.orbit.samples import stationary_within
 
 if TYPE_CHECKING:
-    from contfric.curves.conditions import Condition
-    from contfric.curves.held_conditions import Conditions
+    from contfric.curves.equations.conditions import Condition
+    from contfric.curves.equations.held_conditions import Conditions
 
 #: Margins below this at the start (nondimensional) vanish along the curve, with its condition: located
 #: events are zero to about 1e-12, and those of a group agree to their conditioning.
@@ -68,7 +68,7 @@ class Problem:
 
     def conditions(self) -> tuple[Condition, Conditions]:
         """Return what vanishes, as the compiled engine takes it: nothing is asked of a quantity."""
-        from contfric.curves.held_conditions import no_quantity
+        from contfric.curves.equations.held_conditions import no_quantity
 
         return self.condition, no_quantity()
 
@@ -136,7 +136,7 @@ def check_start(bifurcation: Bifurcation, box: PlaneRanges) -> None:
 
 
 def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
-    from contfric.curves.conditions import SPECTRAL, Condition
+    from contfric.curves.equations.conditions import SPECTRAL, Condition
 
     kind = bifurcation.kind
     orbit = orbit.as_half() if kind is Kind.BP else orbit
@@ -157,7 +157,7 @@ def _spectral_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) 
 
 
 def _sliding_problem(bifurcation: Bifurcation, orbit: Orbit, box: PlaneRanges) -> Problem:
-    from contfric.curves.conditions import EXIT, INTERIOR, JOINT, START, Condition
+    from contfric.curves.equations.conditions import EXIT, INTERIOR, JOINT, START, Condition
 
     kind, system, model = bifurcation.kind, orbit.system, orbit.model
     if not bifurcation.tests:
@@ -249,7 +249,7 @@ def _quiet(system: System, kind: Kind, segment: int, pinned: list[EventFunction]
 
 def tangency(orbit: Orbit, test: EventFunction) -> tuple[int, int, str]:
     """Return (location, segment, surface) of a tangency: where an observable is nearest to a surface."""
-    from contfric.curves.conditions import INTERIOR, JOINT, START
+    from contfric.curves.equations.conditions import INTERIOR, JOINT, START
 
     model, segment = orbit.model, test.segment
     named = [s for s in model.surfaces if s.observable == test.surface]

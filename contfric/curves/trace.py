@@ -12,7 +12,7 @@ from contfric.base.arrays import FloatArray
 from contfric.continuation.points import FIRST_STEP, LARGEST_STEP, MOST_POINTS, Point
 from contfric.curves.after_event import Start, goes_on, is_continuum, prove
 from contfric.curves.assembly import join_sides
-from contfric.curves.births import birth_among
+from contfric.curves.codimension_two.births import birth_among
 from contfric.curves.curve import Curve
 from contfric.curves.half_curve import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
 from contfric.curves.points import end_of_march, first_curve_point, march_on, returned
@@ -107,7 +107,7 @@ def continue_bifurcation(
     whole_number("max_points", max_points, least=2)
     function_of("progress", progress)
     if bifurcation.kind is Kind.NS:
-        from contfric.curves.torus import continue_torus
+        from contfric.curves.of_quantities.torus import continue_torus
 
         check_start(bifurcation, box)
         return continue_torus(bifurcation, box, largest, max_points, progress)

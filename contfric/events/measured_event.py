@@ -82,6 +82,6 @@ class MeasuredEvent(Shown):
         >>> sorted(fold.gradient())
         ['S', 'S0', 'h', 'zeta']
         """
-        from contfric.curves.gradient import event_gradient
+        from contfric.curves.sensitivity.gradient import event_gradient
 
         return event_gradient(cast("Bifurcation", self), parameter)

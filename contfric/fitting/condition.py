@@ -14,8 +14,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.curves.gradient import slope_of
-from contfric.curves.moved_event import moved_event
+from contfric.curves.sensitivity.gradient import slope_of
+from contfric.curves.sensitivity.moved_event import moved_event
 from contfric.errors import ContfricError
 from contfric.events.bifurcation import Bifurcation
 from contfric.fitting.data import Jump, Measured, Series

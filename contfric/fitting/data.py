@@ -94,7 +94,7 @@ class Jump:
     @property
     def parameter(self) -> str:
         """The parameter along which the event was located."""
-        from contfric.curves.gradient import parameter_of
+        from contfric.curves.sensitivity.gradient import parameter_of
 
         return parameter_of(self.event)
 

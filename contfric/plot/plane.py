@@ -35,7 +35,7 @@ from contfric.plot.style import (
 if TYPE_CHECKING:
     from contfric.atlas.plane.plane import Plane
     from contfric.curves.curve import Curve
-    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.of_quantities.curve import QuantityCurve
     from contfric.curves.special import SpecialPoint
 
 #: Colour and width of each kind: what bounds smooth families is strong, where the flow jumps it is fine.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap
     from contfric.continuation.branch import Branch
     from contfric.curves.curve import Curve
-    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.of_quantities.curve import QuantityCurve
     from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.branch import EquilibriumBranch
     from contfric.equilibria.explore import EquilibriumDiagram

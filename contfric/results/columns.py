@@ -15,7 +15,7 @@ from contfric.base.tabled import Tabled
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
 from contfric.curves.curve import Curve
-from contfric.curves.quantity_curve import QuantityCurve
+from contfric.curves.of_quantities.curve import QuantityCurve
 from contfric.ensembles.ensemble import Ensemble
 from contfric.ensembles.tables import events_table, samples_table
 from contfric.equilibria.branch import EquilibriumBranch

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from contfric.atlas.plane.plane import Plane
     from contfric.chaos.map import LyapunovMap
     from contfric.continuation.branch import Branch
-    from contfric.curves.extremum import ExtremumCurve
-    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.of_quantities.curve import QuantityCurve
+    from contfric.curves.of_quantities.extremum import ExtremumCurve
     from contfric.ensembles.ensemble import Ensemble
     from contfric.equilibria.explore import EquilibriumDiagram
     from contfric.fitting.result import Fit

@@ -16,7 +16,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.exploration import Exploration
 from contfric.base.interrupts import held_back
-from contfric.curves.quantity_step import _Called
+from contfric.curves.of_quantities.step import _Called
 
 #: Time after the signal within which a call has returned (s); on an idle machine it is a tenth of that.
 AT_ONCE = 3.0
@@ -33,8 +33,8 @@ from contfric.censuses.sweep import sweep
 from contfric.chaos.cells import follow_cells
 from contfric.continuation.core.locate import locate
 from contfric.continuation.core.march import march
-from contfric.curves.bracket import locate_on_curve
-from contfric.curves.march import march_curve
+from contfric.curves.core.bracket import locate_on_curve
+from contfric.curves.core.march import march_curve
 from contfric.simulation.march import simulate
 from contfric.response.capture import capture
 from contfric.response.section import cut_solutions

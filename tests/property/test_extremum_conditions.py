@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.curves import quantity_step
-from contfric.curves.quantity_step import Defects, Held
+from contfric.curves.of_quantities import step as quantity_step
+from contfric.curves.of_quantities.step import Defects, Held
 from contfric.orbit.gradient import by_parameters
 from contfric.quantities.measure import differentiated
 from contfric.quantities.registry import number_quantity

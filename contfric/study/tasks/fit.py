@@ -172,7 +172,7 @@ class FitTask(Response):
 
 
 def _position(event: Any) -> float:
-    from contfric.curves.gradient import parameter_of
+    from contfric.curves.sensitivity.gradient import parameter_of
 
     return float(event.params[parameter_of(event)])
 

@@ -12,7 +12,7 @@ from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import FigureKind, Job, StudyCheck, pairs_of, ranges_text
 
 if TYPE_CHECKING:
-    from contfric.curves.quantity_curve import QuantityCurve
+    from contfric.curves.of_quantities.curve import QuantityCurve
     from contfric.study.read import Study
 
 
@@ -90,7 +90,7 @@ class HoldTask(QuantityCurveTask):
 
     def compute(self, job: Job) -> QuantityCurve:
         """Follow the curve both ways."""
-        from contfric.curves.quantity_trace import continue_quantity
+        from contfric.curves.of_quantities.trace import continue_quantity
 
         one, other = self.parameters
         start = job.found["orbit"], self.quantity, self.value
@@ -112,7 +112,7 @@ class ExtremumTask(QuantityCurveTask):
 
     def compute(self, job: Job) -> QuantityCurve:
         """Follow the curve both ways."""
-        from contfric.curves.extremum import continue_extremum
+        from contfric.curves.of_quantities.extremum import continue_extremum
 
         start = job.found["orbit"], self.quantity, tuple(self.parameters)
         return continue_extremum(*start, pairs_of(self.range), progress=job.say, **self.options())

@@ -1,8 +1,8 @@
 """Conditions on quantities as border rows, compiled: q free parameters, q - 1 conditions.
 
-What is held or stationary is an extremum over the orbit (:mod:`contfric.curves.lagrangian`), or any other
-function, which is called by its address: it finds the point in arrays that it shares with the march, and
-leaves values and rows there.
+What is held or stationary is an extremum over the orbit (:mod:`contfric.curves.equations.lagrangian`), or
+any other function, which is called by its address: it finds the point in arrays that it shares with the
+march, and leaves values and rows there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from contfric.bvp.equations import LayoutType, close_chain
 from contfric.bvp.system import Layout
 from contfric.compiled import blocks, f8, helper, i8, matrix, vector
 from contfric.continuation.core.geometry import copy_to, copy_vector
-from contfric.curves.lagrangian import (
+from contfric.curves.equations.lagrangian import (
     add_bend,
     differentiated_extreme,
     location_found,

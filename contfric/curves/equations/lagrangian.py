@@ -26,8 +26,8 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.equations import close_chain, segment_rows
 from contfric.compiled import allocating_helper, helper
-from contfric.curves.bending import DIFFERENCE
-from contfric.curves.chain import chain_solve, fill_blocks, set_border
+from contfric.curves.equations.bending import DIFFERENCE
+from contfric.curves.equations.chain import chain_solve, fill_blocks, set_border
 from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_location
 
 

@@ -18,8 +18,8 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.extrema import points_of, settings_of
 from contfric.continuation.hermite import zero_between
 from contfric.continuation.points import MOST_POINTS, Point
-from contfric.curves.quantity_curve import QuantityCurve
-from contfric.curves.quantity_trace import continue_quantity
+from contfric.curves.of_quantities.curve import QuantityCurve
+from contfric.curves.of_quantities.trace import continue_quantity
 from contfric.curves.trace import Progress
 from contfric.errors import ConvergenceError, ParameterError, real_number
 from contfric.events.bifurcation import EndReason

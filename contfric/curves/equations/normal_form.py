@@ -25,9 +25,9 @@ from __future__ import annotations
 
 from contfric.bvp.short_exits import is_divided
 from contfric.compiled import helper
-from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
-from contfric.curves.bordered import _THIRD, end_of, segment_direction
-from contfric.curves.chain import chain_solve, set_border
+from contfric.curves.equations.bending import bend_flow, bend_mean_rate, bend_observable
+from contfric.curves.equations.bordered import _THIRD, end_of, segment_direction
+from contfric.curves.equations.chain import chain_solve, set_border
 
 
 @helper

@@ -9,9 +9,9 @@ import numpy as np
 
 from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import EXTRA, Point
-from contfric.curves.births import end_of_asymmetry
-from contfric.curves.locating import CurveStep, by_label, by_test
-from contfric.curves.meeting import at_once
+from contfric.curves.codimension_two.births import end_of_asymmetry
+from contfric.curves.codimension_two.locating import CurveStep, by_label, by_test
+from contfric.curves.codimension_two.meeting import at_once
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.events.bifurcation import Kind
@@ -26,7 +26,7 @@ _TOGETHER = 1e-8
 MARGINAL = 1e-6
 #: Arclength within which a tangency belongs to a sliding event: where a stop meets a surface labels change.
 _OF_EVENT = 1e-5
-#: Columns after the margins and the distances of the labels (``contfric.curves.correct``).
+#: Columns after the margins and the distances of the labels (``contfric.curves.core.correct``).
 _BEND, _ONE, _MINUS, _PAIR = range(EXTRA)
 
 

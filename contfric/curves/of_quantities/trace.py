@@ -14,10 +14,10 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
-from contfric.curves.locating import CurveStep
+from contfric.curves.codimension_two.locating import CurveStep
+from contfric.curves.of_quantities.curve import QuantityCurve
+from contfric.curves.of_quantities.step import Held
 from contfric.curves.points import end_of_march, march_on, returned
-from contfric.curves.quantity_curve import QuantityCurve
-from contfric.curves.quantity_step import Held
 from contfric.curves.ranges import PlaneRanges, Ranges, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import Progress, largest_step

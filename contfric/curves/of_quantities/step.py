@@ -1,10 +1,11 @@
 r"""Conditions on quantities of orbits, for the compiled march: what vanishes along a curve, and its points.
 
 The unknowns are the joints z and q parameters w, of which q - 1 conditions leave a curve. An extremum over
-the orbit is differentiated in compiled code (:mod:`contfric.curves.lagrangian`). Any other quantity is a
-function of Python that the march calls. In the scaled product of :mod:`contfric.continuation.core.geometry`
-z and w are one vector x. The null space of F' has q directions T, from a QR factorisation of the transpose;
-with the shortest step :math:`\delta_0` to the orbits, :math:`F'\delta_0 = -F`, the row
+the orbit is differentiated in compiled code (:mod:`contfric.curves.equations.lagrangian`). Any other
+quantity is a function of Python that the march calls. In the scaled product of
+:mod:`contfric.continuation.core.geometry` z and w are one vector x. The null space of F' has q directions T,
+from a QR factorisation of the transpose; with the shortest step :math:`\delta_0` to the orbits,
+:math:`F'\delta_0 = -F`, the row
 
 .. math:: r = C'T\,T^T + \frac{C'\delta_0\,\delta_0^T}{\delta_0^T\delta_0}
 
@@ -40,8 +41,8 @@ from contfric.quantities.motion import Directions
 from contfric.quantities.registry import Quantity
 
 if TYPE_CHECKING:
-    from contfric.curves.conditions import Condition
-    from contfric.curves.held_conditions import Conditions
+    from contfric.curves.equations.conditions import Condition
+    from contfric.curves.equations.held_conditions import Conditions
     from contfric.orbit.peak import Extreme
 
 #: A first point this near to the orbit (scaled) is the one that belongs to it.
@@ -234,7 +235,7 @@ class Held:
     @property
     def kind(self) -> int:
         """What is asked of an extremum."""
-        from contfric.curves.held_conditions import AT_VALUE
+        from contfric.curves.equations.held_conditions import AT_VALUE
 
         return AT_VALUE
 
@@ -255,8 +256,8 @@ class Held:
     @cached_property
     def _compiled(self) -> tuple[Condition, Conditions, _Called, object]:
         """The conditions as the march takes them, what it calls, and what keeps that alive."""
-        from contfric.curves.conditions import QUANTITY, Condition
-        from contfric.curves.held_conditions import CALLED, FILL, Conditions
+        from contfric.curves.equations.conditions import QUANTITY, Condition
+        from contfric.curves.equations.held_conditions import CALLED, FILL, Conditions
         from contfric.handle import Block
         from contfric.orbit.peak import Extreme
 

@@ -14,7 +14,7 @@ from contfric.bvp.stationary_values import count_followed
 from contfric.compiled import blocks, f8, i8, kernel
 from contfric.continuation.core.geometry import CourseType
 from contfric.continuation.core.march import marching
-from contfric.curves.correct import (
+from contfric.curves.core.correct import (
     CurveProblemType,
     accept_curve,
     along_curve,

@@ -8,9 +8,9 @@ START       the same at its start, after its reset (T; CS where another mode fol
 EXIT        rate of the exit's observable at the end of a segment: a tangential exit (AS, GS)
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
-            :mod:`contfric.curves.bordered`
-QUANTITY    what is asked of a quantity (:mod:`contfric.curves.held_conditions`); there may be several
-==========  ==================================================================================
+            :mod:`contfric.curves.equations.bordered`
+QUANTITY    what is asked of a quantity (:mod:`contfric.curves.equations.held_conditions`); there may be
+several ==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
 that of the state at a fixed time after the start. All gradients are exact; after a reset they follow by the
@@ -37,8 +37,8 @@ from contfric.bvp.stationary_points import (
 )
 from contfric.bvp.stationary_values import Followed, followed_values
 from contfric.compiled import allocating_helper, f8, helper, i8, indices
-from contfric.curves.bordered import spectral_value, spread_end
-from contfric.curves.chain import BorderedWorkspace, bordered_workspace
+from contfric.curves.equations.bordered import spectral_value, spread_end
+from contfric.curves.equations.chain import BorderedWorkspace, bordered_workspace
 
 JOINT, START, EXIT, INTERIOR, SPECTRAL, QUANTITY = range(6)
 

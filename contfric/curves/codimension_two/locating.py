@@ -93,7 +93,7 @@ class CurveStep(Generic[P]):
 
     def located(self, sought: Sought) -> tuple[Point, bool]:
         """Return the location of a change, and whether it is bracketed to its last digits; compiled."""
-        from contfric.curves.bracket import locate_on_curve
+        from contfric.curves.core.bracket import locate_on_curve
 
         rows = PointRows.empty(self.problem.system, 4, 2)
         rows.put(0, self.before)

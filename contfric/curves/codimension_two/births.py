@@ -16,8 +16,8 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction
 from contfric.continuation.points import Point
 from contfric.continuation.singular_points.vertices import passed_vertex, symmetrised, undoubled
-from contfric.curves.locating import CurveStep
-from contfric.curves.meeting import with_multiplier
+from contfric.curves.codimension_two.locating import CurveStep
+from contfric.curves.codimension_two.meeting import with_multiplier
 from contfric.curves.problem import Problem
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.events.bifurcation import Kind
@@ -79,7 +79,7 @@ def _part_of(orbit: Orbit, farthest: float) -> Orbit | None:
 
 def simpler_problem(problem: Problem, orbit: Orbit) -> tuple[Problem, Orbit] | None:
     """Return the curve of the same sliding event of the symmetric (undoubled) orbit that an orbit is near."""
-    from contfric.curves.conditions import Condition
+    from contfric.curves.equations.conditions import Condition
 
     part = None if problem.test is None else _part_of(orbit, _NEARLY)
     if part is None or problem.test is None:

@@ -21,8 +21,8 @@ from contfric.bvp.stationary_points import find_after_reset, find_stationary
 from contfric.bvp.stationary_values import remember
 from contfric.compiled import allocating_helper, helper, indices, vector
 from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, EXTRA, correcting_along
-from contfric.curves.bending import DIFFERENCE
-from contfric.curves.conditions import (
+from contfric.curves.equations.bending import DIFFERENCE
+from contfric.curves.equations.conditions import (
     EXIT,
     JOINT,
     QUANTITY,
@@ -33,9 +33,9 @@ from contfric.curves.conditions import (
     condition_value,
     curve_workspace,
 )
-from contfric.curves.held_conditions import Conditions, ConditionsType, fill_conditions
-from contfric.curves.lagrangian import LagrangianWorkspace, lagrangian_workspace
-from contfric.curves.normal_form import cubic_coefficient
+from contfric.curves.equations.held_conditions import Conditions, ConditionsType, fill_conditions
+from contfric.curves.equations.lagrangian import LagrangianWorkspace, lagrangian_workspace
+from contfric.curves.equations.normal_form import cubic_coefficient
 from contfric.flow.layouts import FlowType, SecondType
 
 #: The extra column that a curve watches where a branch watches the slope of its parameter: the

@@ -6,7 +6,7 @@ product is a smooth function of the orbit also where the pair meets on the real 
 theta of the pair, the points theta = 2 pi / 3 and pi / 2 are the strong resonances 1:3 and 1:4. As
 everywhere on curves, multipliers are those of a turn: of the half map, for a symmetric orbit.
 
-The orbits and the march are those of a quantity that is held (:mod:`contfric.curves.quantity_step`).
+The orbits and the march are those of a quantity that is held (:mod:`contfric.curves.of_quantities.step`).
 The value is computed from the multipliers to rounding; its slopes, in the tangent plane of the orbits,
 are central differences: a point is as accurate as its multipliers, and only the speed of
 convergence depends on the slopes.
@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.continuation.points import MOST_POINTS, Point
+from contfric.curves.codimension_two.locating import CurveStep
 from contfric.curves.curve import Curve, CurvePart
-from contfric.curves.locating import CurveStep
-from contfric.curves.quantity_step import Defects, Held
-from contfric.curves.quantity_trace import trace_both
+from contfric.curves.of_quantities.step import Defects, Held
+from contfric.curves.of_quantities.trace import trace_both
 from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, CurveEnd, CurveEndReason, SpecialPoint
 from contfric.curves.trace import Progress

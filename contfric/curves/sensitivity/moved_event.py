@@ -1,8 +1,8 @@
 """An event at other parameters: its equations solved again, with the parameter along which it lies free.
 
 The event is followed on the straight line from its own parameters to the others. Each step is predicted by
-the derivatives of its place (:mod:`contfric.curves.gradient`), solved by Newton's method, and halved where
-that fails.
+the derivatives of its place (:mod:`contfric.curves.sensitivity.gradient`), solved by Newton's method, and
+halved where that fails.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.curves.gradient import parameter_of, plane_of, slope_of
 from contfric.curves.points import solve_point
 from contfric.curves.problem import border_of
+from contfric.curves.sensitivity.gradient import parameter_of, plane_of, slope_of
 from contfric.errors import ConvergenceError
 from contfric.events.bifurcation import Bifurcation
 from contfric.orbit.orbit import Orbit

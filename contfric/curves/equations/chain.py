@@ -17,7 +17,7 @@ from contfric.bvp.cyclic import (
 )
 from contfric.bvp.equations import segment_rows
 from contfric.compiled import allocating_helper, helper
-from contfric.curves.bending import DIFFERENCE
+from contfric.curves.equations.bending import DIFFERENCE
 
 
 class BorderedWorkspace(NamedTuple):

@@ -22,7 +22,7 @@ minus the variation of the duration, follows. So J is singular exactly where P h
 trivial one is not in it. A period doubling has null vectors of two turns, ``(-v + s, v)`` with a shift s of
 the first in time; segments do not feel it, and nothing below changes.
 
-Resets and short segments are in :mod:`contfric.curves.bending`. Where an exit row is divided by the
+Resets and short segments are in :mod:`contfric.curves.equations.bending`. Where an exit row is divided by the
 duration u scales with it, and g by a factor that is not zero.
 """
 
@@ -34,8 +34,8 @@ import numpy as np
 
 from contfric.bvp.short_exits import is_divided
 from contfric.compiled import helper
-from contfric.curves.bending import bend_flow, bend_mean_rate, bend_observable
-from contfric.curves.chain import chain_solve, fill_blocks, set_border
+from contfric.curves.equations.bending import bend_flow, bend_mean_rate, bend_observable
+from contfric.curves.equations.chain import chain_solve, fill_blocks, set_border
 
 #: Step of the third derivatives along a null vector of size 1: with Richardson's extrapolation its error
 #: and its rounding are both about 1e-11.

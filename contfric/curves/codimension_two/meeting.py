@@ -81,7 +81,7 @@ def _regular_exit(problem: Problem, point: Point, test: EventFunction) -> EventF
 
 def _of_exit(problem: Problem, exit_: EventFunction) -> Problem:
     """Return the problem of the curve along which an exit is tangential."""
-    from contfric.curves.conditions import EXIT, Condition
+    from contfric.curves.equations.conditions import EXIT, Condition
 
     none = np.empty(0, dtype=np.int64)
     surface = problem.model.surface_index[exit_.surface]

@@ -8,10 +8,10 @@ the total derivatives along the family of orbits (:mod:`contfric.orbit.gradient`
 location of a resonance peak as the last parameter varies, with q = 3 the location where that peak is
 stationary in a second parameter.
 
-Values are exact. Of an extremum over the orbit all of it is compiled (:mod:`contfric.curves.lagrangian`).
-Of any other quantity the slopes of the conditions are central differences at the start, and from then on
-secants (C. G. Broyden, Math. Comp. 19 (1965) 577-593): a point is as accurate as its gradient, and only the
-speed of Newton's method depends on the slopes.
+Values are exact. Of an extremum over the orbit all of it is compiled
+(:mod:`contfric.curves.equations.lagrangian`). Of any other quantity the slopes of the conditions are central
+differences at the start, and from then on secants (C. G. Broyden, Math. Comp. 19 (1965) 577-593): a point is
+as accurate as its gradient, and only the speed of Newton's method depends on the slopes.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from contfric.base.arrays import FloatArray
 from contfric.continuation.extrema import Extremum
 from contfric.continuation.points import MOST_POINTS, Point
 from contfric.continuation.trace import continue_orbit
-from contfric.curves.quantity_curve import QuantityCurve
-from contfric.curves.quantity_step import Defects, Held
-from contfric.curves.quantity_trace import both_sides, check_orbit
+from contfric.curves.of_quantities.curve import QuantityCurve
+from contfric.curves.of_quantities.step import Defects, Held
+from contfric.curves.of_quantities.trace import both_sides, check_orbit
 from contfric.curves.ranges import Ranges, ranges_of
 from contfric.curves.trace import Progress, largest_step
 from contfric.errors import (
@@ -106,7 +106,7 @@ class Stationary(Held):
     @property
     def kind(self) -> int:
         """What is asked of an extremum."""
-        from contfric.curves.held_conditions import STATIONARY
+        from contfric.curves.equations.held_conditions import STATIONARY
 
         return STATIONARY
 

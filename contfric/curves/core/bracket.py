@@ -13,7 +13,7 @@ from contfric.continuation.core.bracket import Rules, bracketing
 from contfric.continuation.core.geometry import PointsType
 from contfric.continuation.core.locate import BY_LABEL, BY_TEST, SoughtType
 from contfric.continuation.core.steps import AT_EVENT, EXTRA
-from contfric.curves.correct import CurveProblemType, along_curve, correct_curve, observe_curve
+from contfric.curves.core.correct import CurveProblemType, along_curve, correct_curve, observe_curve
 
 #: Share of a step to which a location is bracketed.
 _RESOLUTION = 4e-16

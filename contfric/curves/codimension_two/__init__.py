@@ -1,0 +1,1 @@
+"""Points of codimension two: how they are recognised on a curve, located and named."""

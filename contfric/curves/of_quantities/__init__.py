@@ -1,0 +1,1 @@
+"""Curves of orbits that share a value of a quantity, an extremum, or a pair of multipliers."""

@@ -1,0 +1,1 @@
+"""How an event moves with the parameters, and where it is at others."""
