@@ -81,10 +81,10 @@ if TYPE_CHECKING:
     from contfric.models.structures.mechanism import Mechanism as Mechanism
     from contfric.models.two_folds import TwoFold as TwoFold
     from contfric.models.two_folds import find_two_folds as find_two_folds
-    from contfric.orbit.find import find_orbit as find_orbit
+    from contfric.orbit.finding.find import find_orbit as find_orbit
     from contfric.orbit.gradient import Gradient as Gradient
     from contfric.orbit.orbit import Orbit as Orbit
-    from contfric.orbit.resting_positions import RestingPosition as RestingPosition
+    from contfric.orbit.positions.resting import RestingPosition as RestingPosition
     from contfric.orbit.solve import solve_orbit as solve_orbit
     from contfric.quantities.registry import quantity_names as quantity_names
     from contfric.response.basin_map import basins as basins

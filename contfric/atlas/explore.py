@@ -30,8 +30,8 @@ from contfric.continuation.singular_points.vertices import symmetrised
 from contfric.continuation.trace import continue_orbit, follow_orbit
 from contfric.errors import ConvergenceError, function_of, truth, whole_number
 from contfric.events.bifurcation import EndReason
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
 from contfric.remember.advance import in_advance
 

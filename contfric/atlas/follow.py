@@ -49,9 +49,9 @@ from contfric.events.from_simulation import solutions_near
 from contfric.events.incident import incident_forms, kinds_between
 from contfric.events.jumps import nothing_jumps
 from contfric.events.partial_touches import partial_touches
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.canonical.repetition import shortest
+from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.signature import canonical_itinerary
 from contfric.signature.edits import show
 

@@ -15,9 +15,9 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.families.continuum import is_continuum
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, Kind
 from contfric.models.definition import Model
-from contfric.orbit.itineraries import mirror_pairs, whole_of
+from contfric.orbit.canonical.slides import modulo
+from contfric.orbit.itinerary.itineraries import mirror_pairs, whole_of
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import modulo
 from contfric.orbit.solve import ended_at_surfaces, refine
 from contfric.signature import ReducedItinerary, canonical_itinerary
 

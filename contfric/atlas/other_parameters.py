@@ -8,7 +8,7 @@ from dataclasses import asdict
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.explore import explore
 from contfric.errors import AperiodicError, ConvergenceError
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 
 #: Where in the range a start is looked for, in this order: where one orbit attracts, another may not.
 _STARTS = (0.5, 0.25, 0.75, 0.1, 0.9)

@@ -21,8 +21,8 @@ import numpy as np
 from contfric.atlas.matching import guesses
 from contfric.base.arrays import FloatArray
 from contfric.continuation.branch import Branch
+from contfric.orbit.canonical.slides import modulo
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import modulo
 from contfric.orbit.solve import refine
 
 #: States that agree to this (relative to 1 + their size) are the same: both are solved, and a touch is known

@@ -27,7 +27,7 @@ from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.shorthand.tied import tied
-from contfric.orbit.itineraries import whole_of
+from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show
 

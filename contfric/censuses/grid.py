@@ -25,7 +25,7 @@ from contfric.censuses.sections import (
     sweep_from,
 )
 from contfric.models.definition import Model
-from contfric.orbit.itineraries import mirror_pairs
+from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.signature import ReducedItinerary
 from contfric.simulation.simulate import SimulationEnd
 

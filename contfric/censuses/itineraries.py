@@ -15,7 +15,7 @@ from functools import cache
 
 from contfric.errors import ParameterError
 from contfric.models.definition import Model
-from contfric.orbit.itineraries import mirror_pairs
+from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.signature import ReducedItinerary
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.edits import entered, show

@@ -8,8 +8,8 @@ import numpy as np
 
 from contfric.atlas.matching import stops_distance
 from contfric.censuses.itineraries import canonical_pair
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine_with_symmetry
 from contfric.signature import ReducedItinerary
 

@@ -37,7 +37,7 @@ from contfric.censuses.cells import (
 )
 from contfric.censuses.grid import Grid
 from contfric.censuses.orbits import Catalogue
-from contfric.orbit.itineraries import whole_of
+from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
 from contfric.remember.journal import remembered

@@ -191,7 +191,7 @@ def _say_what_settles(
     model: Model, params: dict[str, float], state: list[float] | None, time: float
 ) -> None:
     from contfric.cli.progress import ProgressLine
-    from contfric.orbit.find import find_orbit
+    from contfric.orbit.finding.find import find_orbit
 
     with ProgressLine() as progress:
         orbit = find_orbit(model, params, state=state, time=time, progress=progress)

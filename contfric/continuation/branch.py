@@ -22,10 +22,10 @@ from contfric.continuation.nodes import Nodes, between, nodes_of
 from contfric.errors import ParameterError
 from contfric.events.bifurcation import Bifurcation, End
 from contfric.models.definition import Model
-from contfric.orbit.itineraries import mirror_pairs, mirrored_labels
+from contfric.orbit.itinerary.itineraries import mirror_pairs, mirrored_labels
+from contfric.orbit.itinerary.read_signature import read_signature
+from contfric.orbit.measured.stops import reach_of, reaches_at_joints, stopping_segments
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.read_signature import read_signature
-from contfric.orbit.stops import reach_of, reaches_at_joints, stopping_segments
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,8 +13,8 @@ from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.locating.smooth import SAME_TANGENCY
 from contfric.continuation.points import Point, Settings
 from contfric.events.bifurcation import Bifurcation, Kind
+from contfric.orbit.canonical.sections import moved
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import moved
 
 #: Why a branch ends where its orbits have no joint left that could take the place of one that vanishes.
 LAST_CROSSING = (

@@ -22,8 +22,8 @@ from contfric.errors import (
     whole_number,
 )
 from contfric.models.definition import Model
+from contfric.orbit.canonical.sections import is_smooth
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import is_smooth
 from contfric.quantities.registry import number_quantity
 from contfric.simulation.excitation import check_excitation
 

@@ -10,8 +10,8 @@ from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import EXTRA, Point, Settings, next_to
 from contfric.continuation.singular_points.vertices import symmetrised
 from contfric.errors import ConvergenceError
+from contfric.orbit.canonical.sections import canonical
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
 from contfric.orbit.solve import refine
 from contfric.signature.holds import is_hold
 

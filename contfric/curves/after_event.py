@@ -27,9 +27,9 @@ from contfric.errors import ContfricError, ParameterError
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
 from contfric.events.candidates import candidates
 from contfric.events.sliding_kinds import kind_of_margin
+from contfric.orbit.canonical.sections import canonical, moved
+from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import stationary_within
-from contfric.orbit.sections import canonical, moved
 from contfric.remember.journal import remembered
 
 #: Times of a joint in two itineraries for one motion agree to this (nondimensional): located events are good

@@ -19,8 +19,8 @@ from contfric.events.jumps import nothing_jumps
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.events.touching import rest_at
 from contfric.models.definition import Model
+from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import stationary_within
 
 if TYPE_CHECKING:
     from contfric.curves.equations.conditions import Condition

@@ -21,7 +21,7 @@ from contfric.ensembles.rows import Drawn, Rows, joined
 from contfric.errors import ContfricError, ConvergenceError, ParameterError
 from contfric.events.bifurcation import EndReason
 from contfric.models.definition import Model
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.measure import of_branch, of_orbit
 from contfric.quantities.registry import Quantity, QuantityLike, quantity_of

@@ -215,7 +215,7 @@ def cycle_of_boundary(event: BoundaryPoint, distance: float | None = None) -> Or
 
 def _attractors(event: BoundaryPoint, moved: float) -> Iterator[Orbit]:
     """Yield the orbits that simulations from near a boundary equilibrium come to, near the event."""
-    from contfric.orbit.find import find_orbit
+    from contfric.orbit.finding.find import find_orbit
 
     at = event.equilibrium
     params = {**event.params, event.parameter: event.value + moved}

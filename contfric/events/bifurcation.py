@@ -17,8 +17,8 @@ from contfric.errors import ParameterError, did_you_mean
 from contfric.events.measured_event import MeasuredEvent
 from contfric.events.touching import chosen_at, entered_at, thrown_at
 from contfric.models.definition import Model
+from contfric.orbit.canonical.slides import Outline
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import Outline
 from contfric.remember.stored import made_of
 
 if not TYPE_CHECKING:

@@ -24,11 +24,11 @@ from contfric.events.incident import Incident, edited_whole, incident_forms
 from contfric.events.outcomes import Successor
 from contfric.events.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.events.unit import Form, Unit
+from contfric.orbit.canonical.sections import canonical, is_smooth, joints_left
+from contfric.orbit.canonical.slides import SAME_SOLUTION
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import half_of
+from contfric.orbit.itinerary.itineraries import half_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical, is_smooth, joints_left
-from contfric.orbit.slides import SAME_SOLUTION
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,8 +41,8 @@ from contfric.events.incident import vanishing
 from contfric.events.jumps import nothing_jumps
 from contfric.events.outcomes import NEARLY_NO_LENGTH
 from contfric.events.unit import Form
+from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import time_unit
 from contfric.signature.holds import TOUCH, ends_rest, is_hold
 
 #: Singular values below this, relative to the largest, belong to null directions: events are located to

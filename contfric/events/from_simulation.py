@@ -20,12 +20,12 @@ from contfric.bvp.conserved import conserved
 from contfric.bvp.system import Itinerary, build_system
 from contfric.models.definition import Domain, Model
 from contfric.models.mode_domains import mode_domains
+from contfric.orbit.canonical.sections import is_smooth, without_sections
+from contfric.orbit.canonical.slides import resting_modes
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import whole_of
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.itinerary.itineraries import whole_of
+from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.sections import is_smooth, without_sections
-from contfric.orbit.slides import resting_modes
 from contfric.signature import canonical_itinerary
 from contfric.signature.cyclic import primitive_length
 from contfric.simulation.simulate import SimulationEnd, Trajectory, run

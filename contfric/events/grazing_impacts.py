@@ -12,8 +12,8 @@ from contfric.events.standing_slides import runs_on
 from contfric.events.touching import thrown_at
 from contfric.events.zero_acceleration import touch_of
 from contfric.models.definition import Model
+from contfric.orbit.canonical.section_joints import crossed_at_graze
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.section_joints import crossed_at_graze
 from contfric.signature.edits import Edit, split
 
 

@@ -39,12 +39,12 @@ from contfric.events.outcomes import (
 )
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.events.unit import Form, Unit, form_of, pieces, unit_of
+from contfric.orbit.canonical.section_joints import divided
+from contfric.orbit.canonical.sections import named_by_ends
+from contfric.orbit.canonical.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
 from contfric.orbit.clock import clocked
+from contfric.orbit.measured.samples import state_within
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.samples import state_within
-from contfric.orbit.section_joints import divided
-from contfric.orbit.sections import named_by_ends
-from contfric.orbit.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit
 from contfric.signature.edits import checked_itinerary, edited_pieces
 
 #: Margins below this vanish at an event: it is located to about 1e-13.

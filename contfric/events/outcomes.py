@@ -61,8 +61,8 @@ from contfric.events.zero_acceleration import (
     touches_again,
 )
 from contfric.models.definition import Model
+from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import time_unit
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
 from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
 

@@ -43,10 +43,10 @@ from contfric.events.touching import (
     speeds_of_crossing,
 )
 from contfric.events.zero_acceleration import touch_of
+from contfric.orbit.canonical.sections import canonical, is_smooth
+from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.sections import canonical, is_smooth
-from contfric.orbit.slides import SHORT, time_unit
 from contfric.signature.edits import Edit
 
 #: Most touches over all periods of an orbit of which any are left out: 2^8 combinations, up to rotation.

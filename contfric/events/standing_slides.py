@@ -19,8 +19,8 @@ from contfric.events.contact_outcomes import Joints, Speeds
 from contfric.events.holdable import NO_JUMP, NoJump, leaves_smoothly
 from contfric.events.jumps import nothing_jumps
 from contfric.events.touching import rate_along, rate_scale
+from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import time_unit
 from contfric.signature.edits import Edit, drop, insert, split
 from contfric.signature.holds import is_hold, left_surface
 from contfric.simulation.starts import signs_at

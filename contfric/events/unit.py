@@ -16,10 +16,16 @@ from contfric.base.attributes import cached_property
 from contfric.bvp.system import Itinerary, build_system, mirror_mode
 from contfric.errors import NotationError
 from contfric.models.definition import Model
+from contfric.orbit.canonical.slides import (
+    SAME_SOLUTION,
+    repeats,
+    repetitions,
+    slides_of,
+    time_unit,
+)
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import mirror_pairs
+from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.slides import SAME_SOLUTION, repeats, repetitions, slides_of, time_unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import inside_sign
 from contfric.errors import NotationError
 from contfric.events.jumps import left_to, nothing_jumps
+from contfric.orbit.measured.samples import state_within, stationary_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import state_within, stationary_within
 from contfric.signature.holds import is_hold
 
 #: Pieces of a rest between two stationary points of its observables: where the acceleration that it

@@ -21,7 +21,7 @@ from contfric.events.bifurcation import Bifurcation
 from contfric.fitting.data import Jump, Measured, Series
 from contfric.fitting.predict import predicted
 from contfric.models.definition import Model
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 from contfric.quantities.registry import quantity_of

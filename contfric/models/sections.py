@@ -3,7 +3,7 @@
 A model whose cycles may be smooth declares the surface of its stops (``v = 0``) with a mode on each side.
 The field is the same on both: nothing happens there, and an orbit that comes to touch it does not change.
 Such modes are one mode to the engine, and the surface is transparent. It only serves to find and to fix
-cycles that meet no other surface (:mod:`contfric.orbit.sections`).
+cycles that meet no other surface (:mod:`contfric.orbit.canonical.sections`).
 """
 
 from __future__ import annotations

@@ -20,11 +20,11 @@ from contfric.bvp.system import Itinerary, System, build_system
 from contfric.errors import ParameterError
 from contfric.models.definition import Model
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import half_of, mirror_pairs, whole_of
-from contfric.orbit.measured_quantities import MeasuredOrbit
-from contfric.orbit.read_signature import read_signature
-from contfric.orbit.samples import samples, state_within
-from contfric.orbit.stops import reach_of, stops_of
+from contfric.orbit.itinerary.itineraries import half_of, mirror_pairs, whole_of
+from contfric.orbit.itinerary.read_signature import read_signature
+from contfric.orbit.measured.quantities import MeasuredOrbit
+from contfric.orbit.measured.samples import samples, state_within
+from contfric.orbit.measured.stops import reach_of, stops_of
 from contfric.orbit.tolerances import margin_slack, no_time
 from contfric.signature import Signature
 
@@ -390,7 +390,7 @@ class Orbit(MeasuredOrbit):
         return animate_orbit(self, path, frames, rate)
 
     def __repr__(self) -> str:
-        from contfric.orbit.kept_positions import positions_of
+        from contfric.orbit.positions.kept import positions_of
 
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         name = self.name if self.converged else "not solved"  # an iterate may have no signature

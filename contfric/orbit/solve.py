@@ -15,10 +15,10 @@ from contfric.bvp.system import System, build_system
 from contfric.errors import ConvergenceError, ParameterError, function_of, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.shorthand.tied import tied
+from contfric.orbit.canonical.sections import has_sections, named_by_ends
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import half_of
+from contfric.orbit.itinerary.itineraries import half_of
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.sections import has_sections, named_by_ends
 from contfric.remember.journal import SLOW, remembered
 from contfric.signature import Signature, reduced_itinerary
 from contfric.simulation.excitation import check_excitation

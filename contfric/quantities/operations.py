@@ -32,7 +32,7 @@ def evaluate_tape(course, t, y, which, values, grads):  # type: ignore[no-untype
 
     Parameters
     ----------
-    course : flow, tape and parameters (:class:`contfric.orbit.integral_parts.IntegralCourse`)
+    course : flow, tape and parameters (:class:`contfric.orbit.functionals.integral_parts.IntegralCourse`)
     values : shape (K,)
     grads : gradients of observables, shape (K, 1 + n + len(which)), not filled if (K, 0)
     """

@@ -42,9 +42,13 @@ _MOVED = {
     "contfric.curves.quantity_step": "contfric.curves.of_quantities.step",
     "contfric.curves.quantity_trace": "contfric.curves.of_quantities.trace",
     "contfric.curves.torus": "contfric.curves.of_quantities.torus",
+    "contfric.orbit.find": "contfric.orbit.finding.find",
     "contfric.orbit.holds": "contfric.bvp.holds",
     "contfric.orbit.margins": "contfric.bvp.margins",
+    "contfric.orbit.resting_positions": "contfric.orbit.positions.resting",
+    "contfric.orbit.section_joints": "contfric.orbit.canonical.section_joints",
     "contfric.orbit.simulation": "contfric.simulation.simulate",
+    "contfric.orbit.slides": "contfric.orbit.canonical.slides",
     "contfric.orbit.system": "contfric.bvp.system",
 }
 #: Objects of one shape that are written as rows of arrays: for fewer it saves nothing.

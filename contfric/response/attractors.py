@@ -16,7 +16,7 @@ from contfric.errors import (
     shown,
 )
 from contfric.models.definition import Model
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine_with_symmetry
 from contfric.response.targets import Targets, targets_of

@@ -30,7 +30,7 @@ _GROWTH = 4
 #: is left of a thousand such steps is 1e-11.
 _ROUNDINGS = 10.0
 #: Points of one period and the next that differ by less (relative to 1 + their size) are the same, as
-#: those of an orbit are (:mod:`contfric.orbit.repetition`).
+#: those of an orbit are (:mod:`contfric.orbit.canonical.repetition`).
 _SAME = 1e-8
 
 

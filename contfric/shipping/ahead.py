@@ -43,7 +43,7 @@ def every_kernel() -> dict[str, Kernel]:
     from contfric.flow.coded.kernels import KERNELS as CODED
     from contfric.flow.general import FlowKind, kernels_of
     from contfric.models.generated.unit import callers
-    from contfric.orbit.integral_states import KERNELS as CARRYING
+    from contfric.orbit.functionals.integral_states import KERNELS as CARRYING
 
     found = [kernel for kind in FlowKind for kernel in kernels_of(kind)]
     found += [*CODED.values(), *CHATTERING.values(), *CARRYING.values(), *callers()]

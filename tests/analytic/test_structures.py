@@ -85,7 +85,7 @@ def test_a_blade_whose_damper_never_slips_is_linear() -> None:
 
 def test_an_orbit_that_grazes_is_not_followed_twice() -> None:
     """From the graze of an impact the orbit run through twice solves the equations, too: it is no branch."""
-    from contfric.orbit.repetition import shortest
+    from contfric.orbit.canonical.repetition import shortest
 
     diagram = cf.explore(cf.find_orbit("pounding"), "w", (0.7, 0.95))
     assert len(diagram.branches) == 4  # two of them with one impact in two periods

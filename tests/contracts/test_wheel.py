@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 SHIPPED = (
     "contfric_model_*.functions",
     *("contfric.flow.oscillator.flow.period", "contfric.flow.oscillator.flow.level"),
-    "contfric.orbit.extent.extent",
+    "contfric.orbit.measured.extent.extent",
 )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import contfric as cf
-from contfric.orbit.aperiodic import MOST, affordable, why_none
+from contfric.orbit.finding.aperiodic import MOST, affordable, why_none
 
 
 def test_fewer_periods_are_followed_where_a_period_is_much_work() -> None:

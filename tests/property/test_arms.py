@@ -16,7 +16,7 @@ from contfric.continuation.singular_points.arms import arms_at, passages, turnin
 from contfric.continuation.singular_points.vertices import undoubled_part
 from contfric.events.bifurcation import Kind
 from contfric.events.sequences import count, lengths
-from contfric.orbit.distance import cyclic_apart, farthest_apart
+from contfric.orbit.canonical.distance import cyclic_apart, farthest_apart
 
 #: Random scenes (of seed 31) with folds of bridges of several holds, and most periods of their orbits.
 SCENES = [(163, 1), (179, 1), (179, 2)]

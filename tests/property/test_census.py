@@ -19,8 +19,8 @@ from contfric.censuses.conditions import Arcs, Fate, least_periods
 from contfric.censuses.grid import CensusLimits
 from contfric.censuses.itineraries import canonical_pair, closed_itineraries, is_stop, letters_of
 from contfric.censuses.sections import sections_of
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import is_closed_walk

@@ -10,7 +10,7 @@ import pytest
 import contfric as cf
 from contfric.bvp.conserved import conserved, kept_by
 from contfric.models.evaluate import floats
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.itinerary.one_way import only_grows
 from contfric.signature import canonical_itinerary
 from contfric.simulation.simulate import Trajectory
 

@@ -12,7 +12,7 @@ import contfric as cf
 from contfric.atlas.exploration import Exploration
 from contfric.continuation.ends.at_events import lost_in_end
 from contfric.continuation.points import settings_of
-from contfric.orbit.repetition import shortest
+from contfric.orbit.canonical.repetition import shortest
 
 MODEL = Path(__file__).resolve().parents[1] / "models" / "switched.yaml"
 

@@ -16,7 +16,7 @@ import contfric as cf
 from contfric.atlas import matching
 from contfric.atlas.completeness.verification import differences
 from contfric.bvp.system import build_system
-from contfric.orbit.repetition import shortest
+from contfric.orbit.canonical.repetition import shortest
 from tests.property.test_fast_cycles import welander
 
 MCKEAN = """

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit.itineraries import decode
+from contfric.orbit.itinerary.itineraries import decode
 
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 SCENES = {

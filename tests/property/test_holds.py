@@ -16,7 +16,7 @@ from contfric.continuation.singular_points.vertices import passed_vertex
 from contfric.errors import NotationError
 from contfric.events.unit import form_of, pieces, unit_of
 from contfric.models import load_model
-from contfric.orbit.samples import state_within
+from contfric.orbit.measured.samples import state_within
 from contfric.signature import (
     canonical_itinerary,
     double,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.orbit import integral_states as carried
+from contfric.orbit.functionals import integral_states as carried
 from contfric.orbit.gradient import by_parameters
 from contfric.quantities.functionals import Measuring
 from contfric.quantities.inside import inside_of

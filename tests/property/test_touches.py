@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import contfric as cf
-from contfric.orbit.section_crossings import every_crossing
+from contfric.orbit.canonical.section_crossings import every_crossing
 from contfric.orbit.solve import refine
 
 MODELS = Path(__file__).parents[1] / "models"

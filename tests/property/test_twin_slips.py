@@ -10,7 +10,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.matching import inner_orbit, on_branch
 from contfric.bvp.conserved import conserved
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.itinerary.one_way import only_grows
 
 MASSES, CONTACTS = 6, 5
 

@@ -24,8 +24,8 @@ from contfric.continuation.singular_points.switching import (
 )
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import Decision, End, EndReason, Kind
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.remember.advance import foresee
 
 #: A branch shorter than this (arclength) that comes back to its event has been nowhere.

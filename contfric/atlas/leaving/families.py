@@ -18,8 +18,8 @@ from contfric.continuation.points import Settings, next_to
 from contfric.continuation.trace import follow_family
 from contfric.events.bifurcation import TERMINAL, End, Kind
 from contfric.events.candidates import candidates
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
 
 #: Where an orbit near an event is looked for, relative to the range.

@@ -12,9 +12,9 @@ from contfric.continuation.accuracy.moved_by_errors import duration_error
 from contfric.continuation.branch import Branch
 from contfric.continuation.located_event import ROUGH
 from contfric.events.standing_slides import STANDS, goes_nowhere
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.canonical.repetition import shortest
+from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 
 #: Why an itinerary is refused in which a mode can only last for no time.
 ONLY_GROWS = "something only grows along it, as a slider's offset that slips to one side: it cannot come back"
@@ -53,7 +53,7 @@ def fault_of(branch: Branch, width: float) -> str | None:
 
 
 def _only_touches(branch: Branch, at: list[int], asked: list[Orbit]) -> bool:
-    """Tell whether an itinerary has modes that no periodic motion is in (:mod:`contfric.orbit.one_way`)."""
+    """Tell whether an itinerary has modes that no periodic motion is in (``orbit.itinerary.one_way``)."""
     return fault_of_itinerary(asked[0]) is not None
 
 

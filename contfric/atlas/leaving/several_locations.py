@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.linear import equations_at
+from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import SHORT, time_unit
 
 #: Singular values below this share of the largest belong to freedoms, as in :mod:`contfric.bvp.linear`.
 _NULL = 1e-7

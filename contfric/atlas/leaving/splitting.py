@@ -13,8 +13,8 @@ from contfric.atlas.leaving.departures import ends_at
 from contfric.continuation.points import next_to
 from contfric.events.bifurcation import Decision, Kind
 from contfric.events.split_touch import pinned_first, splits
+from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
 from contfric.orbit.solve import refine
 
 #: Where an orbit of the other side is looked for, relative to the range: the pin moves by the root of it.

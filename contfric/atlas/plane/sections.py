@@ -16,7 +16,7 @@ from contfric.continuation.trace import follow_orbit
 from contfric.curves.ranges import PlaneRanges
 from contfric.errors import ContfricError, ParameterError, mapping_of, real_number, shown
 from contfric.events.bifurcation import EndReason
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 from contfric.orbit.orbit import Orbit
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError, shown, whole_number
 from contfric.models.definition import Model
-from contfric.orbit.find import find_orbit
+from contfric.orbit.finding.find import find_orbit
 from contfric.orbit.orbit import Orbit
 from contfric.simulation.starts import signs_at
 

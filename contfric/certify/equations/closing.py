@@ -21,7 +21,7 @@ from contfric.certify.equations.zeros import Closing
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import numbers, zeros
 from contfric.models.mode_domains import mirror_mode
-from contfric.orbit.itineraries import whole_of
+from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.orbit.orbit import Orbit
 
 

@@ -22,9 +22,9 @@ from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import column
 from contfric.models.definition import Model
-from contfric.orbit.itineraries import half_of
+from contfric.orbit.itinerary.itineraries import half_of
+from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import stationary_within
 from contfric.signature.holds import hold_at, is_hold
 
 #: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.

@@ -32,8 +32,8 @@ from contfric.events.gradients import (
     surface_gradient,
 )
 from contfric.events.zero_acceleration import joint_within, stationary_values
+from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import time_unit
 from contfric.orbit.solve import refine
 
 #: Least accuracy that is claimed, relative to the range: two ways to one event differ by a little more than

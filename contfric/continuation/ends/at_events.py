@@ -20,10 +20,10 @@ from contfric.events.jumps import nothing_jumps
 from contfric.events.locations import locations_of
 from contfric.events.outcomes import outcome_at
 from contfric.events.touching import entered_at, is_crossed, thrown_at
+from contfric.orbit.canonical.sections import is_smooth
+from contfric.orbit.canonical.slides import SHORT
+from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import stationary_within
-from contfric.orbit.sections import is_smooth
-from contfric.orbit.slides import SHORT
 
 #: An orbit of this size (relative) is a point: located events are good to the root of rounding at a vertex.
 _NO_SIZE = 1e-5

@@ -30,9 +30,9 @@ from contfric.continuation.singular_points.vertices import (
 from contfric.continuation.step import Step
 from contfric.events.bifurcation import Bifurcation, End, EndReason, Kind
 from contfric.events.doubling_point import moved, opening
+from contfric.orbit.canonical.repetition import shortest
+from contfric.orbit.canonical.sections import is_smooth
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.repetition import shortest
-from contfric.orbit.sections import is_smooth
 
 #: Near an event at which Newton fails steps are shortened by this factor, down to this length.
 SHORTER, NEAREST = 8.0, 1e-8

@@ -31,8 +31,8 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import Margin, System
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
+from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import SHORT, time_unit
 
 #: What is solved for again is the same orbit but for the lengths of holds: all joints stay within so many of
 #: the largest length. They are functions of the lengths, with derivatives of the order of one.

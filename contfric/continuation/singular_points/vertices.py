@@ -16,11 +16,11 @@ from contfric.bvp.system import System, build_system
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
 from contfric.events.doubling_point import EVEN, NEARLY, solved_at_vertex
+from contfric.orbit.canonical.section_crossings import crossings_near
+from contfric.orbit.canonical.sections import in_halves, is_smooth
 from contfric.orbit.clock import clocked
-from contfric.orbit.itineraries import half_of
+from contfric.orbit.itinerary.itineraries import half_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.section_crossings import crossings_near
-from contfric.orbit.sections import in_halves, is_smooth
 
 #: Odd parts below this (nondimensional) are what a singular system leaves undetermined.
 _ODD = 1e-5

@@ -26,7 +26,7 @@ from contfric.curves.equations.lagrangian import (
     quantity_row,
 )
 from contfric.handle import HandleType
-from contfric.orbit.peak import Extreme, ExtremeType
+from contfric.orbit.functionals.peak import Extreme, ExtremeType
 
 #: What the conditions are: an extremum that has a value, one that is stationary in all free parameters but
 #: the last, a function that is called.

@@ -1,6 +1,6 @@
 r"""An extremum over the orbit as a condition of a curve, compiled: its gradient, and that of its gradient.
 
-Let Q(z, p) be the extremum (:mod:`contfric.orbit.peak`). The orbits F(z, p) = 0 have the total
+Let Q(z, p) be the extremum (:mod:`contfric.orbit.functionals.peak`). The orbits F(z, p) = 0 have the total
 derivatives
 
 .. math:: \frac{dQ}{dp_k} = G_{p_k}, \qquad G = Q' - \lambda^T F', \qquad F_z^T \lambda = Q_z ,
@@ -28,7 +28,12 @@ from contfric.bvp.equations import close_chain, segment_rows
 from contfric.compiled import allocating_helper, helper
 from contfric.curves.equations.bending import DIFFERENCE
 from contfric.curves.equations.chain import chain_solve, fill_blocks, set_border
-from contfric.orbit.peak import ExtremeWorkspace, extreme_row, extreme_workspace, find_location
+from contfric.orbit.functionals.peak import (
+    ExtremeWorkspace,
+    extreme_row,
+    extreme_workspace,
+    find_location,
+)
 
 
 class LagrangianWorkspace(NamedTuple):

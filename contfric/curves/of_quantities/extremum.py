@@ -39,9 +39,9 @@ from contfric.errors import (
     shown,
     whole_number,
 )
+from contfric.orbit.canonical.sections import canonical
 from contfric.orbit.gradient import by_parameters
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated, of_orbit, of_orbits
 from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 

@@ -11,7 +11,7 @@ from a QR factorisation of the transpose; with the shortest step :math:`\delta_0
 
 takes the place of C': both agree in all directions that a step of Newton's method may have. So conditions are
 differentiated in q + 1 directions only. Of integrals and extrema the row itself is known
-(:mod:`contfric.orbit.integrals`), and nothing of this is needed.
+(:mod:`contfric.orbit.functionals.integrals`), and nothing of this is needed.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from contfric.quantities.registry import Quantity
 if TYPE_CHECKING:
     from contfric.curves.equations.conditions import Condition
     from contfric.curves.equations.held_conditions import Conditions
-    from contfric.orbit.peak import Extreme
+    from contfric.orbit.functionals.peak import Extreme
 
 #: A first point this near to the orbit (scaled) is the one that belongs to it.
 _NEAR = 0.02
@@ -228,7 +228,7 @@ class Held:
         peak = None if self.quantity is None else peak_of(self.quantity)
         if peak is None:
             return None
-        from contfric.orbit.peak import Extreme
+        from contfric.orbit.functionals.peak import Extreme
 
         return Extreme(*peak, self.orbit.as_whole().system.layout)
 
@@ -259,7 +259,7 @@ class Held:
         from contfric.curves.equations.conditions import QUANTITY, Condition
         from contfric.curves.equations.held_conditions import CALLED, FILL, Conditions
         from contfric.handle import Block
-        from contfric.orbit.peak import Extreme
+        from contfric.orbit.functionals.peak import Extreme
 
         shape, q = self.orbit.joints.shape, len(self.box.names)
         joints, vector = np.empty(shape), np.empty(len(self.orbit.vector))

@@ -30,8 +30,8 @@ from contfric.errors import (
 )
 from contfric.events.bifurcation import EndReason
 from contfric.events.sliding_kinds import kind_of_margin
+from contfric.orbit.canonical.sections import canonical
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import canonical
 from contfric.quantities.measure import differentiated
 from contfric.quantities.registry import Quantity, QuantityLike, number_quantity
 

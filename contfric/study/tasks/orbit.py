@@ -57,7 +57,7 @@ class Start(Task):
         state = self.simulate.state if self.simulate else None
         asked.check_state(("start", "simulate", "state"), state)
         if self.at is not None:
-            from contfric.orbit.kept_positions import checked_positions
+            from contfric.orbit.positions.kept import checked_positions
 
             at = self.at
             asked.attempt(("start", "at"), lambda: checked_positions(asked.model, at))
@@ -107,7 +107,7 @@ class Start(Task):
             heard(f"solving for {study.signature.name or study.signature}")
             found = solve_orbit(study.model, study.signature, study.params, progress=heard)
             return found.resting_at(self.at or {})
-        from contfric.orbit.find import find_orbit
+        from contfric.orbit.finding.find import find_orbit
 
         assert self.simulate is not None
         heard("simulating")

@@ -8,13 +8,13 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import build_system
-from contfric.orbit.aperiodic import MOST_PERIODS
+from contfric.orbit.canonical.repetition import shortest
+from contfric.orbit.canonical.section_crossings import loops
+from contfric.orbit.canonical.sections import is_smooth, without_sections
 from contfric.orbit.clock import clocked
+from contfric.orbit.finding.aperiodic import MOST_PERIODS
+from contfric.orbit.finding.rest import creeps
 from contfric.orbit.orbit import Orbit, Status
-from contfric.orbit.repetition import shortest
-from contfric.orbit.rest import creeps
-from contfric.orbit.section_crossings import loops
-from contfric.orbit.sections import is_smooth, without_sections
 from contfric.orbit.solve import centred, refine_with_symmetry
 from contfric.signature.cyclic import primitive_length
 from contfric.simulation.simulate import Trajectory

@@ -12,7 +12,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.crossed_surfaces import crossed_by
 from contfric.models.definition import Domain, Model
 from contfric.models.mode_domains import mode_domains
-from contfric.orbit.itineraries import decode, end_domain, passed_domains
+from contfric.orbit.itinerary.itineraries import decode, end_domain, passed_domains
 from contfric.signature import Signature
 from contfric.signature.holds import TOUCH, domains_after, is_hold
 from contfric.signature.impacts import impact_at, mirror_name

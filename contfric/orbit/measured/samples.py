@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import whole_number
-from contfric.orbit.read_signature import segment_domains
+from contfric.orbit.itinerary.read_signature import segment_domains
 from contfric.simulation.starts import signs_at
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def samples(
     Parameters
     ----------
     labels : passages through transparent surfaces, as for
-    :func:`contfric.orbit.read_signature.segment_domains`
+    :func:`contfric.orbit.itinerary.read_signature.segment_domains`
     points : about how many samples; each segment has three at least
     """
     points = whole_number("points", points, least=1, most=_MOST_SAMPLES)

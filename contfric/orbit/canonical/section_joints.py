@@ -17,10 +17,10 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import build_system
+from contfric.orbit.canonical.sections import at_wall, is_smooth, lies_on, only_touches
+from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import at_wall, is_smooth, lies_on, only_touches
-from contfric.orbit.slides import SHORT, time_unit
 
 #: Most crossings of one segment that are looked for, and how near to its end one is the end itself.
 _MOST, _AT_JOINT = 1000, 1e-8

@@ -236,7 +236,7 @@ class Places:
         """
         if not (self.given or self.stated):
             return orbit
-        from contfric.orbit.resting_positions import resting_at
+        from contfric.orbit.positions.resting import resting_at
 
         kept = [p.contact for p in positions_of(orbit)]
         stated = {name: value for name, value in self.stated.items() if name in kept}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import Itinerary
 from contfric.models.definition import Model
-from contfric.orbit.samples import stationary_within
+from contfric.orbit.measured.samples import stationary_within
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -124,7 +124,7 @@ def reach_of(orbit: Orbit) -> tuple[float, float]:
     model, whole = orbit.model, orbit.as_whole()
     x = [orbit.cycle[:, 1]]
     if model.displacement:
-        from contfric.orbit.extent import extent
+        from contfric.orbit.measured.extent import extent
 
         c, out = model.observable_index[model.displacement], np.empty(2)
         system, joints = whole.system, np.ascontiguousarray(whole.joints)

@@ -23,7 +23,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.conserved import conserved
 from contfric.errors import ContfricError, ParameterError
-from contfric.orbit.kept_positions import (
+from contfric.orbit.positions.kept import (
     Position,
     at_rest,
     checked_positions,
@@ -270,7 +270,7 @@ class _Course:
 
     def _beyond(self, end: _End) -> Orbit | None:
         """Return the orbit that a simulation from beyond an event comes to, if it keeps its place."""
-        from contfric.orbit.find import simulated_orbit
+        from contfric.orbit.finding.find import simulated_orbit
 
         model, params = end.orbit.model, end.orbit.params
         lasts = end.orbit.durations

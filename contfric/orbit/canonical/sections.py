@@ -16,9 +16,13 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import Itinerary, build_system
 from contfric.models.definition import Model
+from contfric.orbit.canonical.section_crossings import (
+    SectionCrossings,
+    every_crossing,
+    fastest_crossings,
+)
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.section_crossings import SectionCrossings, every_crossing, fastest_crossings
 
 #: States that repeat themselves to this (relative to 1 + their size) are the same.
 _SAME = 1e-8

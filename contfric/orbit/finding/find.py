@@ -13,7 +13,7 @@ from contfric.errors import ConvergenceError, function_of, real_number, whole_nu
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.shorthand.tied import tied
-from contfric.orbit.aperiodic import (
+from contfric.orbit.finding.aperiodic import (
     MOST,
     MOST_PERIODS,
     affordable,
@@ -25,11 +25,11 @@ from contfric.orbit.aperiodic import (
     stays,
     why_none,
 )
-from contfric.orbit.kept_positions import Places
+from contfric.orbit.finding.recurrences import EXACT, orbit_come_to, recurrences
+from contfric.orbit.finding.rest import beyond_creep, check_rest, comes_to_rest, is_point, winds
+from contfric.orbit.finding.sizes import warn_of_sizes
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.recurrences import EXACT, orbit_come_to, recurrences
-from contfric.orbit.rest import beyond_creep, check_rest, comes_to_rest, is_point, winds
-from contfric.orbit.sizes import warn_of_sizes
+from contfric.orbit.positions.kept import Places
 from contfric.remember.journal import remembered
 from contfric.simulation.simulate import SimulationEnd, Trajectory, go_on, simulate
 from contfric.simulation.time_scale import clock_period, time_scale

@@ -10,8 +10,8 @@ from numba import types
 from contfric.base.arrays import FloatArray
 from contfric.bvp.after_reset import apply_reset
 from contfric.compiled import allocating_helper, helper, indices, table, vector
-from contfric.orbit.integral_parts import integral_workspace
-from contfric.orbit.peak import extreme_workspace, fill_cycle
+from contfric.orbit.functionals.integral_parts import integral_workspace
+from contfric.orbit.functionals.peak import extreme_workspace, fill_cycle
 from contfric.quantities.tape import Tape
 
 TapeType = types.NamedTuple([table, vector, indices, indices], Tape)

@@ -20,7 +20,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.conserved import conserved
 from contfric.errors import ConvergenceError
 from contfric.models.definition import Model
-from contfric.orbit.one_way import only_grows
+from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.simulation.simulate import Trajectory
 

@@ -13,9 +13,9 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import cached_property
 from contfric.models.definition import Model
+from contfric.orbit.canonical.sections import only_touches
+from contfric.orbit.measured.samples import state_within
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.samples import state_within
-from contfric.orbit.sections import only_touches
 
 #: Parts of a cycle that agree to this (nondimensional) are the same solution: the root of rounding.
 SAME_SOLUTION = 1e-5
@@ -151,7 +151,7 @@ class Outline:
 
     def _apart_from(self, there: FloatArray) -> float:
         """Return how far joints are from the starts: in their order, unless they have none."""
-        from contfric.orbit.distance import cyclic_apart, farthest_apart
+        from contfric.orbit.canonical.distance import cyclic_apart, farthest_apart
 
         measure = cyclic_apart if self.ordered else farthest_apart
         return float(measure(self.starts, there, self._cycles))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.bvp.system import build_system
+from contfric.orbit.canonical.sections import shortened
 from contfric.orbit.clock import clocked
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.sections import shortened
 
 #: Joints that repeat themselves to this (relative to 1 + their size) are the same: rounding over a
 #: multiplier's distance from 1 of 1e-7.

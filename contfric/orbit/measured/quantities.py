@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from functools import cached_property
 
     from contfric.base.arrays import FloatArray
+    from contfric.orbit.canonical.slides import Outline
+    from contfric.orbit.functionals.integrals import Integrals
     from contfric.orbit.gradient import Gradient
-    from contfric.orbit.integrals import Integrals
     from contfric.orbit.orbit import Orbit
-    from contfric.orbit.resting_positions import RestingPosition
-    from contfric.orbit.slides import Outline
+    from contfric.orbit.positions.resting import RestingPosition
     from contfric.quantities.motion import Directions
     from contfric.quantities.registry import QuantityLike
     from contfric.quantities.tape import Tape
@@ -29,7 +29,7 @@ class MeasuredOrbit(Shown):
     @cached_property
     def outline(self) -> Outline:
         """The slides of the solution, whatever itinerary it is solved with."""
-        from contfric.orbit.slides import outline_of
+        from contfric.orbit.canonical.slides import outline_of
 
         return outline_of(cast("Orbit", self))
 
@@ -39,7 +39,7 @@ class MeasuredOrbit(Shown):
 
         Each is a :class:`contfric.RestingPosition`; ``resting_at`` returns the orbit at another one.
         """
-        from contfric.orbit.resting_positions import resting_of
+        from contfric.orbit.positions.resting import resting_of
 
         return resting_of(cast("Orbit", self))
 
@@ -55,7 +55,7 @@ class MeasuredOrbit(Shown):
         ParameterError
             If a contact slips along the orbit, or cannot rest there.
         """
-        from contfric.orbit.resting_positions import resting_at
+        from contfric.orbit.positions.resting import resting_at
 
         return resting_at(cast("Orbit", self), at)
 
@@ -75,7 +75,7 @@ class MeasuredOrbit(Shown):
         sign : float
             1 for the largest value, -1 for the least.
         """
-        from contfric.orbit.peak import extreme_with_derivatives
+        from contfric.orbit.functionals.peak import extreme_with_derivatives
 
         return extreme_with_derivatives(cast("Orbit", self), observable, inside, sign)
 
@@ -91,7 +91,7 @@ class MeasuredOrbit(Shown):
         rate : of the waves in them, so many in the period of the orbit; 0 without waves
         directions : how the orbit moves; None where no derivatives are wanted
         """
-        from contfric.orbit.integrals import integrals_of
+        from contfric.orbit.functionals.integrals import integrals_of
 
         return integrals_of(cast("Orbit", self), tape, rate, directions)
 

@@ -7,8 +7,8 @@ with :math:`t = t_0 + s d`, :math:`y = \varphi(t_0, y_0, s d; p)`, and its integ
 
 :math:`\nabla g` by :math:`(t_0, y_0, d, p)` is the gradient of g by (t, y, p), one pass backwards
 (:mod:`contfric.quantities.tape`), times the derivatives of the flow. So the derivatives are one row by joints
-and parameters, as that of an extremum is (:mod:`contfric.orbit.peak`), whatever the number of directions
-that it is asked for in. Expression and derivatives are resolved on the panels of
+and parameters, as that of an extremum is (:mod:`contfric.orbit.functionals.peak`), whatever the number of
+directions that it is asked for in. Expression and derivatives are resolved on the panels of
 :mod:`contfric.quantities.panels`, by the same rules. Where an argument of ``abs``, ``sign`` or ``where``
 changes its sign inside of a panel, or nothing resolves it, this says so, and the panels of Python decide.
 """
@@ -25,7 +25,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.equations import LayoutType
 from contfric.compiled import blocks, f8, helper, i8, indices, kernel, matrix, vector
 from contfric.flow.layouts import FlowType
-from contfric.orbit.integral_parts import (
+from contfric.orbit.functionals.integral_parts import (
     AFTER_A_CUT,
     ALL_AT_ONCE,
     ASKED,
@@ -47,8 +47,13 @@ from contfric.orbit.integral_parts import (
     sample_at_once,
     sample_part,
 )
-from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn
-from contfric.orbit.peak import Extreme, ExtremeType
+from contfric.orbit.functionals.integral_rows import (
+    TapeType,
+    add_to_joints,
+    enter_segment,
+    whole_turn,
+)
+from contfric.orbit.functionals.peak import Extreme, ExtremeType
 from contfric.quantities.motion import Directions, goes_on
 from contfric.quantities.panels import DEEPEST, RESOLVED, ROUNDING, resolved_level
 from contfric.quantities.tape import Tape
@@ -321,7 +326,7 @@ def integrals_of(
 
 def _carried(orbit: Orbit, tape: Tape, engine: Any, at: Any, found: Any) -> bool:
     """Carry the integrals along as states, where that is the way; tell whether they were found so."""
-    from contfric.orbit.integral_states import carried_by, carry
+    from contfric.orbit.functionals.integral_states import carried_by, carry
 
     flow = carried_by(orbit.model, tape)
     return flow is not None and bool(carry(*engine, flow.address, *at, *found))

@@ -3,9 +3,9 @@ r"""Integrals of expressions over an orbit of an integrated flow: each is one mo
 With :math:`y' = f(t, y, p)` an integral is a state of its own, with :math:`q' = g(t, y, p)` and q = 0 at the
 start of a segment. The integrator carries it along, and its variations with those of the states: one pass
 over the segment gives the integral and its gradient by start, duration and parameters, with the error that a
-step may make. Nodes (:mod:`contfric.orbit.integrals`) would ask for many short passes, and for many nodes in
-boundary layers, which the steps of the solution resolve anyhow. An expression with a kink or jump (``abs``,
-``sign``, ``where``) is left to these.
+step may make. Nodes (:mod:`contfric.orbit.functionals.integrals`) would ask for many short passes, and for
+many nodes in boundary layers, which the steps of the solution resolve anyhow. An expression with a kink or
+jump (``abs``, ``sign``, ``where``) is left to these.
 
 The model with more states is one like any other: its functions call those of the model and evaluate the
 expressions (:mod:`contfric.quantities.operations`), which are data. No kernel is compiled for an expression
@@ -48,9 +48,14 @@ from contfric.flow.layouts import FlowType
 from contfric.handle import TABLE, WEIGHTS, Block, Bound, HandleType, with_handle
 from contfric.models.definition import Model
 from contfric.models.structures.growing_model import ComposedModel
-from contfric.orbit.integral_parts import IntegralCourse, reach_node
-from contfric.orbit.integral_rows import TapeType, add_to_joints, enter_segment, whole_turn
-from contfric.orbit.peak import ExtremeType
+from contfric.orbit.functionals.integral_parts import IntegralCourse, reach_node
+from contfric.orbit.functionals.integral_rows import (
+    TapeType,
+    add_to_joints,
+    enter_segment,
+    whole_turn,
+)
+from contfric.orbit.functionals.peak import ExtremeType
 from contfric.quantities.operations import differentiate_tape, evaluate_tape
 from contfric.quantities.tape import Tape
 
@@ -277,7 +282,7 @@ def fill_row(row, y1, jac, n, j, count):  # type: ignore[no-untyped-def]
 def carry(  # type: ignore[no-untyped-def]
     functions, layout, extreme, tape, carried, z, p, which, extra, out, on_joints, by_parameters
 ):
-    """Write what :func:`contfric.orbit.integrals.integrate` does, the integrals carried along as states."""
+    """Write what :func:`~.integrals.integrate` does, the integrals carried along as states."""
     m, free, exact, whole = z.shape[1], which.shape[0], on_joints.shape[0] > 0, extreme.whole
     length, count, columns, n = whole.modes.shape[0], out.shape[0], 3 + m + free, m - 1
     turn = whole_turn(functions, layout, extreme, tape, z, p, which, 0, columns)

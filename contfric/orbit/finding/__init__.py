@@ -1,0 +1,1 @@
+"""From a simulation to a periodic orbit: its returns, where it rests, when it is given up."""

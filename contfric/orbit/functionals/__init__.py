@@ -1,0 +1,1 @@
+"""Integrals and extrema over a whole orbit with their gradients, compiled."""

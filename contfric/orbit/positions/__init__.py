@@ -1,0 +1,1 @@
+"""Where contacts rest that never slip along an orbit."""
