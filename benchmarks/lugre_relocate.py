@@ -20,8 +20,8 @@ import numpy as np
 
 import contfric as cf
 from contfric.bvp.system import build_system
-from contfric.models.describe import from_text
-from contfric.models.files import model_of
+from contfric.models.reading.describe import from_text
+from contfric.models.reading.files import model_of
 from contfric.orbit.solve import refine
 
 #: What is varied: tolerance of the integration; phase of the cut with the largest step.

@@ -77,8 +77,8 @@ if TYPE_CHECKING:
     from contfric.models import model_names as model_names
     from contfric.models.check import ModelReport as ModelReport
     from contfric.models.check import check_model as check_model
-    from contfric.models.oscillator import OscillatorModel as OscillatorModel
-    from contfric.models.structures.mechanism import Mechanism as Mechanism
+    from contfric.models.reading.mechanism import Mechanism as Mechanism
+    from contfric.models.reading.oscillator import OscillatorModel as OscillatorModel
     from contfric.models.two_folds import TwoFold as TwoFold
     from contfric.models.two_folds import find_two_folds as find_two_folds
     from contfric.orbit.finding.find import find_orbit as find_orbit

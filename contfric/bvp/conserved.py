@@ -19,8 +19,8 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.definition import Model
-from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.structures.growing_model import ComposedModel
+from contfric.models.described.evaluate import Sampler, defaults, floats
+from contfric.models.growing_model import ComposedModel
 
 Itinerary = tuple[tuple[str, str], ...]
 #: Parameters, time, state and rate.
@@ -84,7 +84,7 @@ def _kept(still: FloatArray, changes: FloatArray) -> FloatArray:
 
 @cache
 def _samplers(model: Model) -> tuple[Sampler, Sampler]:
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     description = from_text(model.definition)
     params = defaults(description)

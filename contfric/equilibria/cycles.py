@@ -64,7 +64,7 @@ def _with_section(event: HopfPoint) -> HopfPoint:
 
     The rate of a state vanishes at an equilibrium.
     """
-    from contfric.models.phases import with_phase
+    from contfric.models.deriving.phases import with_phase
 
     at = event.equilibrium
     divided = None if any(_sections(event)) else with_phase(at.model, at.region.mode)

@@ -1,7 +1,7 @@
 r"""Where each field of a model holds: its region, the surfaces that bound it, and whether a state is inside.
 
-Modes of one field are one mode (:mod:`contfric.models.sections`): a section through an equilibrium means
-nothing to it. A mode with kinks has a region for each combination of their sides.
+Modes of one field are one mode (:mod:`contfric.models.deriving.sections`): a section through an equilibrium
+means nothing to it. A mode with kinks has a region for each combination of their sides.
 
 A mode that moves freely has its own field ``f(y, p)``. A mode that lies on surfaces ``h(y, p) = 0`` has a
 field that is tangent to them there; away from them it means nothing. It is taken together with an attraction
@@ -163,9 +163,9 @@ def regions_of(model: Model) -> tuple[ModeRegion, ...]:
     """
     import sympy
 
-    from contfric.models.describe import from_text
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.numbers import function_of_numbers
+    from contfric.models.reading.describe import from_text
 
     if not model.definition:
         raise ParameterError(
@@ -216,8 +216,8 @@ def check_no_excitation(model: Model, params: Mapping[str, float], active: str =
     """
     if model.autonomous or not model.definition:
         return
-    from contfric.models.describe import from_text
     from contfric.models.generated.symbols import Formulas
+    from contfric.models.reading.describe import from_text
 
     formulas = Formulas(from_text(model.definition))
     known = {

@@ -38,7 +38,7 @@ from contfric.errors import NotationError
 from contfric.events.touching import coming_back, second_rate
 from contfric.events.zero_acceleration import only_comes_back, touch_of
 from contfric.models.definition import Model
-from contfric.models.structures.growing_model import ComposedModel
+from contfric.models.growing_model import ComposedModel
 from contfric.orbit.orbit import Orbit
 from contfric.signature.edits import Edit, split, swap_edit
 from contfric.signature.holds import is_hold

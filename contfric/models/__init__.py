@@ -1,8 +1,9 @@
 """Models by name, by file or by class: bundled ones, those of installed packages, and the user's.
 
 A package offers models by the entry point group ``contfric.models``; an entry is a
-:class:`~contfric.models.definition.Model`, a class of :class:`~contfric.models.oscillator.OscillatorModel`,
-the path of a YAML file, the path of a folder of such files, or a function that returns one of these.
+:class:`~contfric.models.definition.Model`, a class of
+:class:`~contfric.models.reading.oscillator.OscillatorModel`, the path of a YAML file, the path of a folder
+of such files, or a function that returns one of these.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from contfric.models.definition import Model as Model
-    from contfric.models.oscillator import OscillatorModel
+    from contfric.models.reading.oscillator import OscillatorModel
 
 __all__ = ["DEFAULT_MODEL", "Model", "ModelSource", "Parameters", "load_model", "model_names"]
 

@@ -17,7 +17,7 @@ several domains can follow (:attr:`Model.targets`).
 
 Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
 side. Where cycles may be smooth, the surface of the stops (``v = 0``) has two modes of the same field on its
-sides: it is a section (:mod:`contfric.models.section_maps`).
+sides: it is a section (:mod:`contfric.models.maps.section_maps`).
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from contfric.base.arrays import FloatArray
 from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, did_you_mean, mapping_of, shown
+from contfric.models.maps.transition_maps import TransitionMaps
 from contfric.models.parts import (
     Chatter,
     Constraint,
@@ -49,7 +50,6 @@ from contfric.models.parts import (
     Surface,
     Symmetry,
 )
-from contfric.models.transition_maps import TransitionMaps
 from contfric.remember.stored import given, made_of
 
 if TYPE_CHECKING:
@@ -118,7 +118,8 @@ class Model(Shown, TransitionMaps):
     displacement : str
         The displacement as an observable, where it may have extrema inside of segments; else empty.
     phase : str
-        The surface of the phase that divides modes in which orbits may stay (:mod:`contfric.models.phases`).
+        The surface of the phase that divides modes in which orbits may stay
+        (:mod:`contfric.models.deriving.phases`).
     quantities : tuple of (str, str)
         Name and expression of each quantity of its own (:mod:`contfric.quantities`), such as an energy.
     ball_factory : callable or None
@@ -188,9 +189,9 @@ class Model(Shown, TransitionMaps):
         """Modes that are integrated numerically, and why (of a model that is declared by its equations)."""
         if not self.definition:
             return {}
-        from contfric.models.describe import from_text
         from contfric.models.generated.formula_tables import forms_of
         from contfric.models.generated.symbols import integrated_modes
+        from contfric.models.reading.describe import from_text
 
         if forms_of(self.definition) is not None:
             return {}

@@ -70,7 +70,7 @@ def _entries() -> list[EntryPoint]:
 
 def _read(path: Path) -> Model:
     """Build the model of a file; the closed form needs nothing of what reads one."""
-    from contfric.models.files import read_model
+    from contfric.models.reading.files import read_model
 
     return read_model(path)
 
@@ -106,7 +106,7 @@ def _folder_of(entry: EntryPoint) -> Path | None:
 
 
 def _from_object(found: Any, what: str) -> Model:
-    from contfric.models.oscillator import OscillatorModel, model_of_class
+    from contfric.models.reading.oscillator import OscillatorModel, model_of_class
 
     if isinstance(found, Model):
         return found

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from functools import cache
 
 from contfric.models.definition import Model
+from contfric.models.described.regions import is_possible
+from contfric.models.growing_model import ComposedModel
 from contfric.models.lazy_mapping import Made
-from contfric.models.regions import is_possible
-from contfric.models.structures.growing_model import ComposedModel
 
 
 @cache

@@ -82,7 +82,7 @@ class Domain:
     """A region of one mode: the sign of (observable - level) for every surface, 0 = on it.
 
     ``declared`` is the mode as it was declared, where that is one with others
-    (:mod:`contfric.models.sections`).
+    (:mod:`contfric.models.deriving.sections`).
     """
 
     name: str

@@ -38,7 +38,7 @@ from contfric.base.shown import Shown
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, Model
-from contfric.models.description import Description
+from contfric.models.described.description import Description
 from contfric.models.generated.symbols import Formulas
 from contfric.models.language.formulas import vanishes
 from contfric.models.language.numbers import function_of_numbers
@@ -197,7 +197,7 @@ class _Tangencies:
         cls, model: Model, vector: FloatArray, surface: str, above: str, below: str
     ) -> _Tangencies:
         """Derive them from the formulas of a model."""
-        from contfric.models.describe import from_text
+        from contfric.models.reading.describe import from_text
 
         description = from_text(model.definition)
         formulas, fields = _formulas(description)

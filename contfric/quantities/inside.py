@@ -13,9 +13,9 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
+from contfric.models.growing_model import ComposedModel
 from contfric.models.language.grammar import PI, TIME, Scope, names_in, parse
 from contfric.models.language.quantity_texts import FORCE_OF, WORK, Functional, no_contact
-from contfric.models.structures.growing_model import ComposedModel
 from contfric.quantities.duals import Dual, Kinks, constant
 from contfric.quantities.motion import Place
 from contfric.quantities.panels import Function
@@ -169,7 +169,7 @@ def definitions_of(model: Model) -> Mapping[str, ast.expr]:
     """Return the named expressions of a model that is declared by its equations; empty of another one."""
     if not model.definition:
         return {}
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     parts = from_text(model.definition).names.parts
     return {name: parse(text) for name, text in parts.items()}
@@ -186,7 +186,7 @@ def laws_of(model: Model) -> tuple[ContactLaws, ...]:
         return ()
     if isinstance(model, ComposedModel):
         return model.composition.laws
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     return from_text(model.definition).laws
 

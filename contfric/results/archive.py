@@ -248,7 +248,7 @@ def _model_of(header: dict[str, Any]) -> Model:
     definition = header.get("definition")
     if not definition:
         return load_model(header["model"])
-    from contfric.models.files import model_of
+    from contfric.models.reading.files import model_of
 
     return model_of(definition)
 

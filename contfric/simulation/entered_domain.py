@@ -20,8 +20,8 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.definition import Domain, Model, Surface
+from contfric.models.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
-from contfric.models.structures.growing_model import ComposedModel
 from contfric.models.view import FlowView
 from contfric.simulation.time_scale import clock_period, time_scale
 

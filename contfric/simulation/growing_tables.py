@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.models.deriving.visited_modes import Way
+from contfric.models.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
-from contfric.models.structures.growing_model import ComposedModel
-from contfric.models.structures.visited_modes import Way
 from contfric.simulation.tables import (
     SOLVED,
     Tables,

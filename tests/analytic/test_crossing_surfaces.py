@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import contfric as cf
 from contfric.models.entries import EntryError
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 #: Two blocks on one belt, coupled by a spring: each switch drives its own block only.
 BLOCKS = """

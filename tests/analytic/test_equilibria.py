@@ -10,7 +10,7 @@ import yaml
 from scipy.optimize import brentq, fsolve
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 
 def typed(text: str) -> cf.Model:

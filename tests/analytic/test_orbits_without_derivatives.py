@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.models.describe import from_text
-from contfric.models.evaluate import floats
+from contfric.models.described.evaluate import floats
+from contfric.models.reading.describe import from_text
 
 #: What is followed of each structure: a parameter, its range, and where an orbit is looked for.
 STRUCTURES: dict[str, tuple[str, tuple[float, float], dict[str, float]]] = {

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 from contfric.models.two_folds import TwoFoldKind
 
 

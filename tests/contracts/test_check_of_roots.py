@@ -8,7 +8,7 @@ import yaml
 from scipy.integrate import solve_ivp
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 #: A super-twisting controller with a disturbance; its root is written in some way.
 TWISTING = """

@@ -22,8 +22,8 @@ from contfric.cli.progress import compiling_shown
 from contfric.compiled import allocating_helper, f8, helper, kernel
 from contfric.compiling import announced
 from contfric.compiling.inlined import part_options
-from contfric.models.describe import describe
 from contfric.models.generated import build
+from contfric.models.reading.describe import describe
 from contfric.shipping import ahead
 from contfric.shipping.ahead import every_kernel
 
@@ -169,7 +169,7 @@ def test_a_damaged_file_of_the_cache_is_compiled_again(fresh_cache, damage):
 @pytest.mark.parametrize("suffix", [".py", ".name"])
 @pytest.mark.parametrize("damage", DAMAGE)
 def test_a_damaged_module_of_a_model_is_generated_again(fresh_cache, damage, suffix, monkeypatch):
-    from contfric.models.files import read_model
+    from contfric.models.reading.files import read_model
 
     definition = read_model(MODELS / "bilinear.yaml").definition
     text = build._generated(definition, "x")

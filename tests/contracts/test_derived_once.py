@@ -12,10 +12,11 @@ import pytest
 import yaml
 
 from contfric.base.resources import bundled_dir
-from contfric.models import files, sections
-from contfric.models.describe import describe
+from contfric.models.deriving import sections
 from contfric.models.generated import build, symbols
 from contfric.models.library import bundled, find
+from contfric.models.reading import files
+from contfric.models.reading.describe import describe
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from contfric.errors import (
     shown,
     whole_number,
 )
-from contfric.models.files import read_model
+from contfric.models.reading.files import read_model
 from contfric.results import load, save
 from contfric.study.read import read_study
 

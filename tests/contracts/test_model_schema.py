@@ -15,9 +15,9 @@ from pydantic_core import PydanticUndefined
 import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.base.yaml_schema import _values
-from contfric.models import schema
-from contfric.models.describe import describe
 from contfric.models.entries import EntryError
+from contfric.models.reading import schema
+from contfric.models.reading.describe import describe
 
 MANUAL = Path(__file__).parents[2] / "docs" / "models.md"
 #: The parts of a file, as the manual calls them, and their schemas.

@@ -12,9 +12,9 @@ import yaml
 
 import contfric as cf
 from contfric.base.resources import bundled_dir
-from contfric.models.describe import describe
 from contfric.models.entries import EntryError
-from contfric.models.files import from_data, model_of
+from contfric.models.reading.describe import describe
+from contfric.models.reading.files import from_data, model_of
 from contfric.results import save
 
 

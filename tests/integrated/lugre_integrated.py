@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from contfric.flow.integrated import TOLERANCE
-from contfric.models.describe import describe
 from contfric.models.generated.build import load_module
+from contfric.models.reading.describe import describe
 
 NAMES = ("Omega", "S", "S0", "sigma0", "sigma1", "c", "vS")
 LUGRE = {

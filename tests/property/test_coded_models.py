@@ -11,13 +11,13 @@ import pytest
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.describe import from_text
 from contfric.models.generated.build import load_module
 from contfric.models.generated.formula_tables import Forms, forms_of
 from contfric.models.generated.table_flow import CodedFlow
 from contfric.models.language.coefficients import AFFINE, Affine, symbols
 from contfric.models.language.grammar import FLOATS, Scope, parse
 from contfric.models.language.not_affine import NotAffineError
+from contfric.models.reading.describe import from_text
 from contfric.simulation.simulate import simulate
 from contfric.simulation.tables import tables
 
@@ -215,7 +215,7 @@ def chain(count: int, contacts: int) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def three() -> cf.Model:
-    from contfric.models.files import from_data
+    from contfric.models.reading.files import from_data
 
     return from_data(chain(4, 3))
 
@@ -282,7 +282,7 @@ def test_too_many_surfaces_are_refused() -> None:
         "surfaces": lines,
         "modes": {"only": {"in": {}, "field": {"x": "v", "v": "-k*x"}}},
     }
-    from contfric.models.files import from_data
+    from contfric.models.reading.files import from_data
 
     with pytest.raises(ModelError, match="has 70 surfaces, a simulation takes 62"):
         simulate(from_data(data), {}, state=[1.0, 0.0])

@@ -148,7 +148,7 @@ def test_nothing_is_listed() -> None:
 
 
 def test_a_saved_orbit_comes_back_in_a_model_that_has_visited_nothing(tmp_path: Any) -> None:
-    from contfric.models.files import model_of
+    from contfric.models.reading.files import model_of
 
     orbit = cf.find_orbit(chain(5, 10, "saved"))
     cf.save(orbit, tmp_path / "orbit.npz")

@@ -9,7 +9,7 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.conserved import conserved, kept_by
-from contfric.models.evaluate import floats
+from contfric.models.described.evaluate import floats
 from contfric.orbit.itinerary.one_way import only_grows
 from contfric.signature import canonical_itinerary
 from contfric.simulation.simulate import Trajectory
@@ -97,7 +97,7 @@ def test_a_slider_that_never_slips_has_an_offset() -> None:
 
 
 def test_the_fields_of_contacts_at_rest_conserve_it_exactly() -> None:
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     model = two_masses()
     field = floats(from_text(model.definition)).field(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 
 @pytest.mark.parametrize("seed", range(4))

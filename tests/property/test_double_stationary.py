@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 
 def model(nonlinear: bool) -> cf.Model:

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 
 def system(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from contfric.errors import ModelError
 from contfric.models.check.derivatives import MANY_DIGITS, slopes
-from contfric.models.describe import describe
 from contfric.models.generated.build import load_module
 from contfric.models.generated.code import printed
 from contfric.models.generated.symbols import Formulas
 from contfric.models.language.formulas import FORMULAS, formula, kinks_in, vanishes
 from contfric.models.language.grammar import FLOATS, Scope, names_in, number_of, parse
-from contfric.models.oscillator import Symbols
+from contfric.models.reading.describe import describe
+from contfric.models.reading.oscillator import Symbols
 
 NAMES = ("x", "v", "t", "a", "b")
 

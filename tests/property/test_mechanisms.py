@@ -15,8 +15,8 @@ from scipy.sparse import csr_matrix
 
 import contfric as cf
 from contfric.errors import ModelError
-from contfric.models.describe import from_text
-from contfric.models.evaluate import floats
+from contfric.models.described.evaluate import floats
+from contfric.models.reading.describe import from_text
 
 PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7, "e": 0.6}
 #: Directions of contacts that act on masses of their own where the mass matrix is diagonal.

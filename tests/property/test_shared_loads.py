@@ -178,7 +178,7 @@ def test_models_come_back_with_their_surfaces(tmp_path: Any) -> None:
     assert one.itinerary == other.itinerary
     np.testing.assert_array_equal(one.states, other.states)
     cf.save(orbit, tmp_path / "orbit.npz")
-    from contfric.models.files import model_of
+    from contfric.models.reading.files import model_of
 
     model_of.cache_clear()
     loaded = cf.load(tmp_path / "orbit.npz")

@@ -12,7 +12,7 @@ import yaml
 import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
-from contfric.models.files import from_data, loaded
+from contfric.models.reading.files import from_data, loaded
 from contfric.plot.style import row_of
 from tests.rescaled import put_in
 

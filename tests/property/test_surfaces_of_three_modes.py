@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 import contfric as cf
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 
 #: Euler's step, how far its chatter and drift let a state be (relative to 1 + the state), and the time.
 _STEP, _NEAR, _END = 2e-4, 5e-3, 4.0

@@ -13,8 +13,8 @@ import yaml
 import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
-from contfric.models.describe import describe
-from contfric.models.files import from_data, loaded
+from contfric.models.reading.describe import describe
+from contfric.models.reading.files import from_data, loaded
 from tests.rescaled import rescaled
 
 FRICTION = """

@@ -2,7 +2,7 @@
 
 Without excitation such an orbit has no joint. Where a branch ends as it leaves the last surface that it met,
 the orbit lies in one mode, and the rate of a state in that mode is a section of what follows
-(:func:`contfric.models.phases.with_phase`).
+(:func:`contfric.models.deriving.phases.with_phase`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TOUCHED = 1e-6
 
 def with_section(orbit: Orbit, loose: Sequence[LooseEnd]) -> Orbit | None:
     """Return an orbit in a model with a section where a loose end goes on in one mode; None if none does."""
-    from contfric.models.phases import with_phase
+    from contfric.models.deriving.phases import with_phase
 
     model = orbit.model
     if not model.autonomous or model.phase:

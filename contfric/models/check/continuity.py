@@ -20,7 +20,7 @@ from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Domain, Reset
-from contfric.models.describe import from_text
+from contfric.models.reading.describe import from_text
 
 #: States that are tried, those of each mode from which lines are followed, and samples of a line.
 _TRIED, _STATES, _SAMPLES = 100, 2, 160

@@ -21,11 +21,11 @@ from contfric.errors import ParameterError
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import Model
-from contfric.models.describe import from_text
-from contfric.models.description import Description
-from contfric.models.evaluate import Evaluator
+from contfric.models.described.description import Description
+from contfric.models.described.evaluate import Evaluator
 from contfric.models.generated.build import field_of
 from contfric.models.language.grammar import UNARY, Algebra
+from contfric.models.reading.describe import from_text
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5

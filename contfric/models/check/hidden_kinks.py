@@ -10,7 +10,7 @@ from contfric.base.arrays import FloatArray
 from contfric.models.check.continuity import Line, jump_along, lines_in
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.describe import from_text
+from contfric.models.reading.describe import from_text
 
 #: This share next to a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
 #: share of a jump by which slopes may change so near it.

@@ -6,8 +6,8 @@ from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Model
-from contfric.models.describe import from_text
 from contfric.models.language.grammar import parse
+from contfric.models.reading.describe import from_text
 
 #: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
 _STARTS = 40

@@ -28,7 +28,7 @@ from contfric.base.sources import kernels_digest
 from contfric.errors import ResultFileError
 from contfric.models.generated.formula_tables import forms_of
 from contfric.models.generated.table_flow import coded_flow
-from contfric.models.structures.growing_model import ComposedModel
+from contfric.models.growing_model import ComposedModel
 
 if TYPE_CHECKING:
     from contfric.compiled import Kernel
@@ -58,8 +58,8 @@ class GeneratedFlow:
 def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
     """Return the flow of a model whose modes of chatter are contact alone, with their impacts."""
     from contfric.flow.chattering import ChatterMode, with_chatter
-    from contfric.models.describe import from_text
-    from contfric.models.regions import engine_order
+    from contfric.models.described.regions import engine_order
+    from contfric.models.reading.describe import from_text
 
     description = from_text(definition)
     modes = [mode.name for mode in description.modes]
@@ -173,8 +173,8 @@ def _generator() -> str:
 
 
 def _generated(definition: str, digest: str) -> str:
-    from contfric.models.describe import from_text
     from contfric.models.generated.generate import module_source
+    from contfric.models.reading.describe import from_text
 
     return module_source(from_text(definition), digest)
 

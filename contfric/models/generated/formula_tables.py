@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
-from contfric.models.description import Description, ModeText
+from contfric.models.described.description import Description, ModeText
+from contfric.models.described.regions import engine_order, known_sides
 from contfric.models.generated.columns import Column
 from contfric.models.language.coefficients import (
     AFFINE,
@@ -30,7 +31,6 @@ from contfric.models.language.coefficients import (
 from contfric.models.language.grammar import parse
 from contfric.models.language.not_affine import NotAffineError
 from contfric.models.parts import Observable, Surface
-from contfric.models.regions import engine_order, known_sides
 
 Form = list[Affine]
 #: Rates of states, over all modes, up to which code is generated: it takes half of the time that tables take,
@@ -269,7 +269,7 @@ class CodedTables:
 @lru_cache(maxsize=64)
 def forms_of(definition: str) -> Forms | None:
     """Return the affine forms of a definition, if its formulas are to be tables; else None."""
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     description = from_text(definition)
     if not description.structure and len(description.modes) * len(description.states) <= _FEW:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from contfric.models.description import Description
+from contfric.models.described.description import Description
 from contfric.models.generated.affine import AffineForm
 from contfric.models.generated.code import SLOPES, VALUES, Lines, Output, write_block
 from contfric.models.generated.linear_code import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from contfric.models.description import Description
+from contfric.models.described.description import Description
 from contfric.models.generated.code import Lines
 
 #: The functions that are kernels: where a model has kinks, three of them are helpers of these.

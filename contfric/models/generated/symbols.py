@@ -14,14 +14,14 @@ import sympy
 
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
-from contfric.models.description import Description
+from contfric.models.described.description import Description
+from contfric.models.described.regions import engine_order, known_sides
 from contfric.models.entries import EntryError
 from contfric.models.functions import as_text
 from contfric.models.generated.affine import AffineForm, affine_form
 from contfric.models.language.formulas import FORMULAS, formula, resolved
 from contfric.models.language.grammar import TIME, parse
 from contfric.models.language.not_affine import NotAffineError
-from contfric.models.regions import engine_order, known_sides
 
 
 class Formulas:

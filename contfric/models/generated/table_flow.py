@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contfric.models.description import ModeText
+from contfric.models.described.description import ModeText
 from contfric.models.generated.columns import Column
 from contfric.models.generated.formula_tables import CodedTables, Forms, forms_of
 from contfric.models.language.not_affine import NotAffineError

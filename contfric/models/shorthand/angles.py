@@ -19,6 +19,7 @@ from contextlib import suppress
 from typing import Any
 
 from contfric.errors import ModelError
+from contfric.models.described.description import wraps_of
 from contfric.models.entries import EntryError
 from contfric.models.language.grammar import FLOATS, TIME, Scope, parse
 from contfric.models.shorthand.clocks import is_clock
@@ -32,11 +33,6 @@ _CUTS = (
 )
 #: A surface lies there if it does so for some states, to rounding.
 _STATES, _ON = 3, 1e-9
-
-
-def wraps_of(angle: str) -> dict[str, int]:
-    """Return the surfaces of an angle, and the side of each on which motion lies."""
-    return {f"{angle}+": -1, f"{angle}-": 1}
 
 
 def with_angles(data: dict[str, Any]) -> dict[str, Any]:

@@ -29,12 +29,12 @@ from typing import Any
 import sympy
 
 from contfric.models.definition import Model
-from contfric.models.description import Description, ModeText
+from contfric.models.deriving.sections import joined_modes
+from contfric.models.described.description import Description, ModeText
+from contfric.models.described.evaluate import defaults
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import defaults
 from contfric.models.generated.symbols import Formulas
 from contfric.models.language.formulas import vanishes
-from contfric.models.sections import joined_modes
 
 #: The key of a reset.
 CHATTER = "chatter"
@@ -101,8 +101,8 @@ def with_chatter(model: Model) -> Model | None:
 @lru_cache(maxsize=_MODELS)
 def _with_chatter_at(definition: str, walls: tuple[str, ...]) -> Model | None:
     """Return the model of a definition with chatter at walls: to derive it takes longer than most orbits."""
-    from contfric.models.derive import model_from
-    from contfric.models.describe import describe, from_text
+    from contfric.models.deriving.derive import model_from
+    from contfric.models.reading.describe import describe, from_text
 
     data = from_text(definition).data()
     for surface in walls:

@@ -41,9 +41,9 @@ from typing import Any
 
 import sympy
 
-from contfric.models.description import Description, ModeText
+from contfric.models.described.description import Description, ModeText
+from contfric.models.described.evaluate import Sampler, defaults, floats
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.generated.symbols import Formulas
 
 _SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))

@@ -25,11 +25,11 @@ from typing import Any
 
 import sympy
 
-from contfric.models.description import Description, ModeText
+from contfric.models.described.description import Description, ModeText
+from contfric.models.described.evaluate import Sampler, defaults, floats
+from contfric.models.described.regions import combinations, engine_order
 from contfric.models.entries import EntryError, as_identifier
-from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.generated.symbols import Formulas
-from contfric.models.regions import combinations, engine_order
 from contfric.models.shorthand.crossing import crossing_parts
 
 #: States at which the heights of two surfaces must differ by the same, and rounding of that.

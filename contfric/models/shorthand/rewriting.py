@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from contfric.base.yaml_lines import Address
-from contfric.models.reset_modes import FROM, TO
+from contfric.models.described.reset_modes import FROM, TO
 
 #: A way down to expressions: a key, and None for all keys of a mapping.
 Place: TypeAlias = tuple[str | None, ...]

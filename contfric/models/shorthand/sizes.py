@@ -16,9 +16,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.models.description import Description
+from contfric.models.described.description import Description
+from contfric.models.described.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.language.grammar import TIME
 from contfric.models.shorthand.clocks import is_clock
 

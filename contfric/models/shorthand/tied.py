@@ -75,8 +75,8 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
     """
     from contfric.errors import ModelError
     from contfric.models import load_model
-    from contfric.models.describe import from_text
-    from contfric.models.files import from_data
+    from contfric.models.reading.describe import from_text
+    from contfric.models.reading.files import from_data
 
     for name in ties:
         model.index_of(name)

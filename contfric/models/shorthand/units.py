@@ -21,9 +21,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.description import Description
+from contfric.models.described.description import Description
+from contfric.models.described.evaluate import Sampler, defaults, floats
 from contfric.models.entries import AUTO, EntryError, known_keys
-from contfric.models.evaluate import Sampler, defaults, floats
 from contfric.models.language.grammar import TIME
 from contfric.models.shorthand.clocks import is_clock
 from contfric.models.shorthand.sizes import chosen_units, rounded

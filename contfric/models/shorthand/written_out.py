@@ -12,10 +12,10 @@ from itertools import product
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.description import Description
+from contfric.models.described.description import Description
+from contfric.models.described.reset_modes import FROM, TO, named_parts
 from contfric.models.entries import EntryError, as_identifier
 from contfric.models.language.grammar import PERIOD, RESERVED
-from contfric.models.reset_modes import FROM, TO, named_parts
 from contfric.models.shorthand.angles import with_angles
 from contfric.models.shorthand.centre import centred
 from contfric.models.shorthand.clocks import value_at_defaults, with_clock
@@ -28,7 +28,7 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
 
     Parameters
     ----------
-    data : in the form of :mod:`contfric.models.schema`
+    data : in the form of :mod:`contfric.models.reading.schema`
     read : reads what is written out
 
     Raises
@@ -89,7 +89,7 @@ def _divided(
     found: Description, data: Mapping[str, Any], read: Callable[[dict[str, Any]], Description]
 ) -> Description:
     """Return a description in which modes that an orbit may stay in are divided by the phase."""
-    from contfric.models.phases import phase_parts
+    from contfric.models.deriving.phases import phase_parts
 
     divided = found
     with suppress(ModelError, ArithmeticError, StopIteration):  # whoever builds the model says why

@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from contfric.errors import ModelError
-from contfric.models.description import STRUCTURE
 from contfric.models.entries import AUTO, known_keys
 from contfric.models.language.coefficient_texts import text_of
 from contfric.models.language.coefficients import AFFINE, symbols
@@ -26,7 +25,7 @@ from contfric.models.structures.contact_ranges import constraints_of
 from contfric.models.structures.contact_surfaces import ContactSurfaces, subsets
 from contfric.models.structures.contacts import Contact, ContactKind, drift
 from contfric.models.structures.matrices import summed, times
-from contfric.models.structures.names import COORDINATES
+from contfric.models.structures.names import COORDINATES, STRUCTURE
 from contfric.models.structures.shared_loads import Limit, Setting, load_name
 from contfric.models.structures.structure import Structure, defaults_of
 

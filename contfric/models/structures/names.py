@@ -9,7 +9,8 @@ from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError
 from contfric.models.language.grammar import check_name, names_in, parse
 
-COORDINATES = "coordinates"
+#: Keys of a model: the structure that modes are made from, and its coordinates.
+STRUCTURE, COORDINATES = "structure", "coordinates"
 
 
 def check_states(

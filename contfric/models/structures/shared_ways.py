@@ -28,7 +28,7 @@ from contfric.models.structures.shared_loads import Limit
 from contfric.models.structures.structure import Structure
 
 if TYPE_CHECKING:
-    from contfric.models.description import Description
+    from contfric.models.described.description import Description
 
 #: Contacts that decide together of which all combinations are listed.
 _ALL = 3

@@ -58,7 +58,7 @@ class Structure:
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Structure:
-        """Return the structure of data in the form of :mod:`contfric.models.schema`.
+        """Return the structure of data in the form of :mod:`contfric.models.reading.schema`.
 
         Raises
         ------

@@ -237,7 +237,7 @@ def _divided_by_phase(trajectory: Trajectory) -> Model | None:
     stays = moves_on(trajectory) if model.autonomous else held or not moves_on(trajectory)
     if not stays:
         return None
-    from contfric.models.phases import with_phase  # which reads the model again
+    from contfric.models.deriving.phases import with_phase  # which reads the model again
 
     return with_phase(model, model.whole_mode(trajectory.last[3]))
 

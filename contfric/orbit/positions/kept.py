@@ -13,7 +13,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.conserved import conserved
 from contfric.errors import ConvergenceError, ParameterError, did_you_mean, real_number
 from contfric.models.definition import Model
-from contfric.models.evaluate import Evaluator, floats
+from contfric.models.described.evaluate import Evaluator, floats
 from contfric.orbit.orbit import Orbit
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def _laws(model: Model) -> tuple[ContactLaws, ...]:
 
 @cache
 def _evaluator(model: Model) -> Evaluator[float]:
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     return floats(from_text(model.definition))
 

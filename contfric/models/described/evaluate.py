@@ -14,7 +14,7 @@ from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Algebra, pars
 from contfric.models.language.python_code import Function, function_of
 
 if TYPE_CHECKING:
-    from contfric.models.description import Description
+    from contfric.models.described.description import Description
 
 T = TypeVar("T")
 

@@ -8,7 +8,7 @@ from typing import Any
 from contfric.errors import ModelError
 from contfric.models.definition import Model
 from contfric.models.entries import EntryError, plain
-from contfric.models.files import from_data
+from contfric.models.reading.files import from_data
 from contfric.models.structures.names import COORDINATES
 
 

@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from contfric.errors import ParameterError
-from contfric.models.chatter_maps import ChatterMaps
-from contfric.models.overlapping import nearest, turned_back
+from contfric.models.maps.chatter_maps import ChatterMaps
+from contfric.models.maps.overlapping import nearest, turned_back
 from contfric.models.parts import across, led
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ class TransitionMaps(ChatterMaps):
 
     @property
     def composed(self) -> bool:
-        """Whether modes are made when they are visited (:mod:`contfric.models.structures.growing_model`)."""
+        """Whether modes are made when they are visited (:mod:`contfric.models.growing_model`)."""
         return False
 
     def mode_order(self, name: str) -> int:

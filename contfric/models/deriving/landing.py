@@ -12,12 +12,12 @@ from collections.abc import Container, Sequence
 from dataclasses import replace
 
 from contfric.models.definition import Domain, Reset, Surface
+from contfric.models.deriving.sections import joined_modes
+from contfric.models.described.description import wraps_of
+from contfric.models.described.evaluate import Sampler
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import Sampler
 from contfric.models.language.grammar import parse
 from contfric.models.parts import EITHER, Lead, led
-from contfric.models.sections import joined_modes
-from contfric.models.shorthand.angles import wraps_of
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24

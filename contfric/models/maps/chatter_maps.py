@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from contfric.models.section_maps import SectionMaps
+from contfric.models.maps.section_maps import SectionMaps
 
 if TYPE_CHECKING:
     from contfric.models.parts import Chatter, Domain

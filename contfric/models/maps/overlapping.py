@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from contfric.models.maps.transition_maps import TransitionMaps
     from contfric.models.parts import Domain
-    from contfric.models.transition_maps import TransitionMaps
 
 
 def nearest(

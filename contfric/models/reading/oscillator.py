@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.definition import Model
 from contfric.models.entries import EntryError
-from contfric.models.files import from_data
 from contfric.models.language.grammar import TIME
+from contfric.models.reading.files import from_data
 
 #: Likeness of two names from which one is a slip of the pen: a letter left out, added or exchanged.
 _SLIP = 0.88

@@ -4,7 +4,8 @@ An orbit needs a joint. One that stays in one mode (below a grazing, off a wall,
 time) has none, unless a surface divides that mode. So each mode in which an orbit may stay is divided by the
 phase of the excitation, ``sin(2 pi t / T - 1) = 0``: it is crossed twice a period whatever motion does, never
 touched, and is its own image half a period later. To all else it is not there: a section is no joint of
-orbits that meet other surfaces (:mod:`contfric.models.sections`), and what labels name leaves it out.
+orbits that meet other surfaces (:mod:`contfric.models.deriving.sections`), and what labels name leaves it
+out.
 
 No orbit stays in a mode that ends at known times, or of which the region fixes the sign of the rate of a
 state (a slide, ``x' = v > 0``), nor where a state that is no angle has a constant rate.
@@ -23,13 +24,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from contfric.errors import ModelError
-from contfric.models.description import Description, ModeText
-from contfric.models.evaluate import Sampler, defaults, floats
-from contfric.models.measuring import proportional
+from contfric.models.deriving.measuring import proportional
+from contfric.models.deriving.sections import has_kinks, joined_modes
+from contfric.models.described.description import Description, ModeText
+from contfric.models.described.evaluate import Sampler, defaults, floats
+from contfric.models.described.regions import domains_of, engine_order, known_sides
+from contfric.models.described.reset_modes import named_parts
 from contfric.models.parts import MOST_SURFACES
-from contfric.models.regions import domains_of, engine_order, known_sides
-from contfric.models.reset_modes import named_parts
-from contfric.models.sections import has_kinks, joined_modes
 from contfric.models.structures.contact_laws import KEY as FORCES
 from contfric.models.structures.contacts import Contact, ContactKind
 
@@ -68,8 +69,8 @@ def with_phase(model: Model, mode: str) -> Model | None:
 
 @lru_cache(maxsize=_MODELS)
 def _with_phase(definition: str, mode: str) -> Model | None:
-    from contfric.models.derive import model_from
-    from contfric.models.describe import describe, from_text
+    from contfric.models.deriving.derive import model_from
+    from contfric.models.reading.describe import describe, from_text
 
     description = from_text(definition)
     data = description.data()

@@ -2,7 +2,7 @@
 
 Data come from a YAML file, a class, :func:`contfric.Mechanism` or a file of results. :func:`checked` returns
 them as plain data in one form, in which every mapping is there. What refers to something else in the file,
-such as the side of a surface, is checked by :mod:`contfric.models.describe`.
+such as the side of a surface, is checked by :mod:`contfric.models.reading.describe`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from contfric.base.yaml_schema import SchemaPart, explained
+from contfric.models.described.reset_modes import FROM, TO, pairs_of
 from contfric.models.entries import EntryError, plain
-from contfric.models.reset_modes import FROM, TO, pairs_of
-from contfric.models.schema_values import (
+from contfric.models.reading.schema_values import (
     EMPTY,
     FORMULA,
     LEFT_OUT,

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from contfric.models.definition import Domain, Surface
-from contfric.models.description import Description
-from contfric.models.evaluate import Sampler
+from contfric.models.described.description import Description
+from contfric.models.described.evaluate import Sampler
+from contfric.models.described.regions import is_possible
 from contfric.models.parts import Departure
-from contfric.models.regions import is_possible
 
 #: A rate this small, at a place that Newton's method found, is zero.
 _STILL = 1e-7

@@ -1,7 +1,7 @@
 """A user's model as plain data: what a YAML file, a class and a results file all come down to.
 
-:func:`contfric.models.describe.describe` reads a mapping in the schema of the YAML files, checks every
-entry, and gives a :class:`Description`. :meth:`Description.data` gives such a mapping back, so that a
+:func:`contfric.models.reading.describe.describe` reads a mapping in the schema of the YAML files, checks
+every entry, and gives a :class:`Description`. :meth:`Description.data` gives such a mapping back, so that a
 description can be stored anywhere (:attr:`Description.text`) and read again with the same checks.
 """
 
@@ -18,12 +18,15 @@ from contfric.models.language.names import Names
 from contfric.models.parts import Chatter, Lead
 from contfric.models.structures.contact_laws import KEY as LAWS
 from contfric.models.structures.contact_laws import ContactLaws, written
-
-#: The key of the structure that modes are made from.
-STRUCTURE = "structure"
+from contfric.models.structures.names import STRUCTURE
 
 #: Expressions of the lowest and the highest value of a state; nothing where it has no range.
 Range: TypeAlias = tuple[str, str] | tuple[()]
+
+
+def wraps_of(angle: str) -> dict[str, int]:
+    """Return the surfaces at which an angle begins again, and the side of each on which motion lies."""
+    return {f"{angle}+": -1, f"{angle}-": 1}
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ class Description:
     laws : what the contacts of a structure carry and dissipate
     units : (state or t, its unit): all formulas are in these (:mod:`contfric.models.shorthand.units`)
     origins : (state, what it is measured from in all formulas), of a symmetry with a shift
-    phase : surface of the phase that divides modes (:mod:`contfric.models.phases`); empty without one
+    phase : surface of the phase that divides modes (:mod:`contfric.models.deriving.phases`); empty without
+    one
     structure : what modes are made from when they are visited; empty where all are listed
     """
 

@@ -20,9 +20,9 @@ from contfric.models.parts import Domain, Mode, Observable, Surface
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
-    from contfric.models.description import Description
+    from contfric.models.deriving.visited_modes import Composition
+    from contfric.models.described.description import Description
     from contfric.models.generated.table_flow import CodedFlow
-    from contfric.models.structures.visited_modes import Composition
 
 #: A domain and a surface through which it is left.
 Exit = tuple[str, str]
@@ -65,17 +65,17 @@ class Sections(Set[Exit]):
 
 
 class ComposedModel(Model):
-    """A model whose modes are made when they are visited (:mod:`contfric.models.structures.visited_modes`).
+    """A model whose modes are made when they are visited (:mod:`contfric.models.deriving.visited_modes`).
 
     ``modes`` and ``domains`` are those that were visited, in that order: one domain a mode. Modes in which an
-    orbit may stay are divided by the phase (:mod:`contfric.models.phases`), others are not.
+    orbit may stay are divided by the phase (:mod:`contfric.models.deriving.phases`), others are not.
     """
 
     @cached_property
     def composition(self) -> Composition:
         """What modes are made from."""
         # other models need none of it
-        from contfric.models.structures.visited_modes import composition_of
+        from contfric.models.deriving.visited_modes import composition_of
 
         return composition_of(self.definition)
 
@@ -323,9 +323,9 @@ class ComposedModel(Model):
     @cached_property
     def coded(self) -> CodedFlow:
         """The flow of the modes that were visited, in that order: the first is that in which none acts."""
-        from contfric.models.describe import from_text
         from contfric.models.generated.formula_tables import Forms
         from contfric.models.generated.table_flow import CodedFlow
+        from contfric.models.reading.describe import from_text
 
         found = CodedFlow(Forms(from_text(self.definition)))
         for surface in self.surfaces[len(self.composition.declared) :]:
@@ -364,12 +364,12 @@ def composed_from(description: Description) -> ComposedModel:
     EntryError
         If its modes are not affine: only these are made one by one.
     """
-    from contfric.models.derive import as_described, level_of
+    from contfric.models.deriving.derive import as_described, level_of
+    from contfric.models.deriving.visited_modes import composition_of
+    from contfric.models.described.evaluate import Sampler, defaults, floats
+    from contfric.models.described.regions import ordered_surfaces
     from contfric.models.entries import EntryError
-    from contfric.models.evaluate import Sampler, defaults, floats
     from contfric.models.language.not_affine import NotAffineError
-    from contfric.models.regions import ordered_surfaces
-    from contfric.models.structures.visited_modes import composition_of
 
     composition = composition_of(description.text)
     try:

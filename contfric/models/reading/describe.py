@@ -9,16 +9,16 @@ from typing import Any
 
 from contfric.errors import ModelError
 from contfric.models.definition import Departure, Observable, Parameter, Surface
-from contfric.models.description import Description, DomainText, ModeText
+from contfric.models.deriving.measuring import measured
+from contfric.models.described.description import Description, DomainText, ModeText
+from contfric.models.described.evaluate import check_period
+from contfric.models.described.quantity_entries import check_quantities
+from contfric.models.described.ranges import check_ranges, ranges_of, spread_of
+from contfric.models.described.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.entries import EntryError, known_keys, known_sides, one_of
-from contfric.models.evaluate import check_period
 from contfric.models.generated.on_disk import derived
 from contfric.models.language.names import Names
-from contfric.models.measuring import measured
 from contfric.models.parts import Chatter
-from contfric.models.quantity_entries import check_quantities
-from contfric.models.ranges import check_ranges, ranges_of, spread_of
-from contfric.models.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.shorthand.clocks import TICK
 from contfric.models.shorthand.written_out import expanded
 from contfric.models.structures.contact_laws import ContactLaws, check_laws
@@ -49,7 +49,7 @@ def _from_text(text: str) -> Description:
 
 
 def describe(data: Mapping[str, Any]) -> Description:
-    """Read and check a model in the schema of the YAML files (:mod:`contfric.models.schema`).
+    """Read and check a model in the schema of the YAML files (:mod:`contfric.models.reading.schema`).
 
     Raises
     ------
@@ -57,7 +57,7 @@ def describe(data: Mapping[str, Any]) -> Description:
         For the first mistake, with the address of its entry.
     """
     # pydantic is loaded where a model is read, and not where one that was read before is used
-    from contfric.models.schema import checked
+    from contfric.models.reading.schema import checked
 
     given = checked(data)
     if COORDINATES in given:

@@ -13,7 +13,7 @@ ways through a surface    (what else holds where it is met, mode that follows): 
                           elements along one direction stop at once. One way only for everything else
 ========================  =================================================================================
 
-The engine's numbers of modes (:class:`contfric.models.structures.growing_model.ComposedModel`) are given in
+The engine's numbers of modes (:class:`contfric.models.growing_model.ComposedModel`) are given in
 the order of the first visit; itineraries and signatures have the names.
 """
 
@@ -25,12 +25,12 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
-from contfric.models.description import ModeText
+from contfric.models.deriving.phases import PART, PhaseParts
+from contfric.models.described.description import ModeText
 from contfric.models.entries import SIDES
 from contfric.models.generated.formula_tables import Forms
 from contfric.models.lazy_mapping import Made
 from contfric.models.parts import Domain, Mode, Surface
-from contfric.models.phases import PART, PhaseParts
 from contfric.models.structures.contact_laws import ContactLaws, law_of, rest_of
 from contfric.models.structures.contact_modes import Combinations
 from contfric.models.structures.contacts import Contact, ContactKind
@@ -39,7 +39,7 @@ from contfric.models.structures.shared_ways import Place, SharedWays
 from contfric.models.structures.structure import Structure
 
 if TYPE_CHECKING:
-    from contfric.models.description import Description
+    from contfric.models.described.description import Description
 
 
 @dataclass(frozen=True)
@@ -392,6 +392,6 @@ class Composition:
 @lru_cache(maxsize=16)
 def composition_of(definition: str) -> Composition:
     """Return the composition of a definition that has a structure."""
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     return Composition(from_text(definition))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from contfric.models.description import Description, Range
+from contfric.models.described.description import Description, Range
+from contfric.models.described.evaluate import defaults, floats
 from contfric.models.entries import EntryError, known_keys
-from contfric.models.evaluate import defaults, floats
 from contfric.models.language.names import Names
 
 

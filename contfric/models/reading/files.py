@@ -62,7 +62,7 @@ def from_data(data: Mapping[str, Any]) -> Model:
 
 def _read_as_text(data: dict[str, Any]) -> str:
     # what reads a model is loaded where one is read, and not where it was read before
-    from contfric.models.describe import describe
+    from contfric.models.reading.describe import describe
 
     return describe(data).text
 
@@ -99,9 +99,9 @@ def model_of(definition: str) -> Model:
 
 
 def _model_from(definition: str) -> Model:
-    from contfric.models.derive import model_from
-    from contfric.models.describe import from_text
+    from contfric.models.deriving.derive import model_from
     from contfric.models.generated.build import prepare
+    from contfric.models.reading.describe import from_text
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place

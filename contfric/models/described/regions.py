@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from contfric.models.definition import Domain, Surface
-from contfric.models.description import Description, DomainText, ModeText
+from contfric.models.described.description import Description, DomainText, ModeText
+from contfric.models.described.evaluate import defaults, floats
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import defaults, floats
 
 Sides = dict[str, int]
 

@@ -16,22 +16,22 @@ from contfric.base.arrays import FloatArray
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.definition import Constraint, Departure, Domain, Mode, Model, Surface, Symmetry
-from contfric.models.departing import (
+from contfric.models.deriving.departing import (
     departing_side,
     leaves_at_rest,
     limit_departures,
     other_departures,
     turned_modes,
 )
-from contfric.models.description import Description, Range
+from contfric.models.deriving.landing import reset_of
+from contfric.models.deriving.measuring import displacement_of, extrema_at_joints
+from contfric.models.deriving.sections import clear_surfaces, join_domains, joined_modes
+from contfric.models.described.description import Description, Range
+from contfric.models.described.evaluate import Evaluator, Sampler, defaults, floats
+from contfric.models.described.regions import domains_of, is_possible, ordered_surfaces
 from contfric.models.entries import EntryError
-from contfric.models.evaluate import Evaluator, Sampler, defaults, floats
 from contfric.models.generated.build import GeneratedFlow
-from contfric.models.landing import reset_of
 from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Scope, parse
-from contfric.models.measuring import displacement_of, extrema_at_joints
-from contfric.models.regions import domains_of, is_possible, ordered_surfaces
-from contfric.models.sections import clear_surfaces, join_domains, joined_modes
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
@@ -63,7 +63,7 @@ class Spread:
 
 @lru_cache(maxsize=64)
 def _evaluator(definition: str) -> Evaluator[float]:
-    from contfric.models.describe import from_text
+    from contfric.models.reading.describe import from_text
 
     return floats(from_text(definition))
 
@@ -77,7 +77,7 @@ def model_from(description: Description) -> Model:
         If the description contradicts itself; with the address of the entry.
     """
     if description.structure:
-        from contfric.models.structures.growing_model import composed_from
+        from contfric.models.growing_model import composed_from
 
         return composed_from(description)
     params = defaults(description)

@@ -1,0 +1,1 @@
+"""From a description to a definition: domains, sections, where resets and slides lead."""

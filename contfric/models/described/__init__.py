@@ -1,0 +1,1 @@
+"""A model as plain data: what was written, in one form, and its value at points."""
