@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 
 import contfric as cf
-from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from contfric.plot.appearance.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

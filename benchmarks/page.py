@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 from measuring import Row
 
-from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from contfric.plot.appearance.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

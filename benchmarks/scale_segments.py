@@ -24,7 +24,7 @@ import contfric as cf
 from contfric.bvp.system import build_system
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
-from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from contfric.plot.appearance.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

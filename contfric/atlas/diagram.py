@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from contfric.atlas.completeness.verification import Verification
     from contfric.atlas.scenario import Scenario
     from contfric.certify.diagram_certificate import DiagramCertificate
+    from contfric.plot.diagrams.look import LineStyle
     from contfric.plot.live.frame import Frame
     from contfric.plot.live.serve import Live
-    from contfric.plot.look import LineStyle
     from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
@@ -309,7 +309,7 @@ class Diagram(Shown):
         signature's name; ``linestyles`` how ``"stable"``, ``"unstable"``, ``"unknown"`` parts and a
         ``"bridge"`` are drawn. ``inset`` draws a part once more, larger: where events crowd, or (low, high).
         """
-        from contfric.plot.diagram import plot_diagram_row
+        from contfric.plot.diagrams.diagram import plot_diagram_row
 
         return plot_diagram_row(
             self,

@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     with ProgressLine(options.quiet) as progress:
         study = read_study(options.study)
         if study.drawings:
-            from contfric.plot.undocumented import load_undocumented
+            from contfric.plot.appearance.undocumented import load_undocumented
 
             load_undocumented()
         result = run_study(study, options.out, force=options.force, progress=progress)
@@ -148,8 +148,8 @@ def _draw_graph(model: Model, path: Path) -> None:
         raise ResultFileError(
             f"cannot draw to '{path}': its ending is not one of {', '.join(formats)}"
         )
+    from contfric.plot.appearance.save import new_figure, save_figure
     from contfric.plot.graph import plot_transition_graph
-    from contfric.plot.save import new_figure, save_figure
     from contfric.results import replacing
 
     figure = new_figure(7.0, 5.0)

@@ -19,8 +19,8 @@ from contfric.cli.progress import ProgressLine
 _LOADED = (
     "contfric.study.run",
     "contfric.study.drawings",
-    "contfric.plot.diagram",
-    "contfric.plot.orbit",
+    "contfric.plot.diagrams.diagram",
+    "contfric.plot.orbits.orbit",
 )
 
 

@@ -350,7 +350,7 @@ class Branch(Shown):
 
     def plot(self, ax: Axes | None = None, row: QuantityLike = "x_max") -> Axes:
         """Draw one quantity of the branch against its parameter."""
-        from contfric.plot.diagram import plot_branches
+        from contfric.plot.diagrams.diagram import plot_branches
 
         return plot_branches([self], row, ax=ax)
 

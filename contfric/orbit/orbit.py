@@ -379,13 +379,13 @@ class Orbit(MeasuredOrbit):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the orbit in the phase plane, coloured by domain."""
-        from contfric.plot.orbit import plot_orbit
+        from contfric.plot.orbits.orbit import plot_orbit
 
         return plot_orbit(self, ax=ax)
 
     def animate(self, path: str | Path, frames: int = 120, rate: int = 30) -> Path:
         """Write one period in the phase plane as an animation (a gif), and return its path."""
-        from contfric.plot.trajectory import animate_orbit
+        from contfric.plot.orbits.trajectory import animate_orbit
 
         return animate_orbit(self, path, frames, rate)
 

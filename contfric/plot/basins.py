@@ -12,10 +12,10 @@ from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from contfric.plot.cells import draw_cells
-from contfric.plot.names import parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import GREY, NEXT_TO, SMALL, branch_colours, lighter, sized
+from contfric.plot.appearance.cells import draw_cells
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import GREY, NEXT_TO, SMALL, branch_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins

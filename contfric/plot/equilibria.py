@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.plot.names import event_label, parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import (
+from contfric.plot.appearance.names import event_label, parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import (
     BLACK,
     GREY,
     LINE_WIDTH,

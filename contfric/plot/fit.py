@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from contfric.plot.names import parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import LINE_WIDTH, SMALL, sized
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import LINE_WIDTH, SMALL, sized
 
 if TYPE_CHECKING:
     from contfric.base.tabled import Columns

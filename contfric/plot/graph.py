@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 
 from contfric.models import Model
-from contfric.plot.names import surface_label
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import BLACK, GREY, SMALL, TEXT, domain_colours, lighter, sized
+from contfric.plot.appearance.names import surface_label
+from contfric.plot.appearance.save import axes_or_new
+from contfric.plot.appearance.style import BLACK, GREY, SMALL, TEXT, domain_colours, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.signature import Signature

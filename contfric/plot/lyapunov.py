@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from contfric.plot.cells import draw_cells
-from contfric.plot.names import fixed_text, parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import GREY, SMALL, TEXT, lighter, sized
+from contfric.plot.appearance.cells import draw_cells
+from contfric.plot.appearance.names import fixed_text, parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import GREY, SMALL, TEXT, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap

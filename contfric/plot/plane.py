@@ -12,10 +12,10 @@ from matplotlib.lines import Line2D
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import either
-from contfric.plot.labels import Anchor, lay_out, place_labels
-from contfric.plot.names import event_label, parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import (
+from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
+from contfric.plot.appearance.names import event_label, parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import (
     BLACK,
     BLUE,
     GREEN,

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.plot.names import fixed_text, parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import GREY, SMALL, TEXT, lighter, sized
+from contfric.plot.appearance.names import fixed_text, parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import GREY, SMALL, TEXT, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.quantities.registry import QuantityLike

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.base.arrays import FloatArray
-from contfric.plot.names import parameter_label
-from contfric.plot.save import axes_or_new, name_axes
-from contfric.plot.style import GREY, LINE_WIDTH, branch_colours, lighter
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.style import GREY, LINE_WIDTH, branch_colours, lighter
 
 if TYPE_CHECKING:
     from contfric.response.returns import ReleaseMap, Returns

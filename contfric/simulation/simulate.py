@@ -162,7 +162,7 @@ class Trajectory(Shown):
 
     def plot(self, ax: Axes | None = None, points: int = 1000) -> Axes:
         """Draw the trajectory in the plane of the first two states, coloured by mode."""
-        from contfric.plot.trajectory import plot_trajectory
+        from contfric.plot.orbits.trajectory import plot_trajectory
 
         return plot_trajectory(self, ax=ax, points=points)
 

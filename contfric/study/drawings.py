@@ -107,8 +107,8 @@ def draw(path: Path, drawing: Drawing, found: Found, title: str) -> None:
 
     Matplotlib is loaded here, and only when a figure is drawn.
     """
-    from contfric.plot.labels import laid_out
-    from contfric.plot.save import installed_fonts, journal, new_figure, save_figure
+    from contfric.plot.appearance.labels import laid_out
+    from contfric.plot.appearance.save import installed_fonts, journal, new_figure, save_figure
 
     wide = nullcontext() if drawing.journal is None else journal(drawing.journal.value)
     with wide, installed_fonts():

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import contfric as cf
-from contfric.plot.names import parameter_label
-from contfric.plot.save import new_figure, save_figure
-from contfric.plot.style import BLACK, BLUE, GREEN, ORANGE, VERMILLION
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import new_figure, save_figure
+from contfric.plot.appearance.style import BLACK, BLUE, GREEN, ORANGE, VERMILLION
 
 IMAGES = Path(__file__).parents[1] / "images"
 

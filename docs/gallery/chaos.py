@@ -148,7 +148,7 @@ def half() -> list[str]:
 
 def draw(found: dict[tuple[float, float], cf.LyapunovMap]) -> None:
     """Draw the maps side by side."""
-    from contfric.plot.save import new_figure, save_figure
+    from contfric.plot.appearance.save import new_figure, save_figure
 
     figure = new_figure(13.0, 10.0)
     grid = figure.subplots(3, 3)

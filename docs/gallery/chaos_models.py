@@ -56,7 +56,7 @@ def map_of(model: str) -> tuple[cf.LyapunovMap, float]:
 
 def table_of_maps() -> list[str]:
     """Compute the maps, draw them, and return the table of what is in them."""
-    from contfric.plot.save import new_figure, save_figure
+    from contfric.plot.appearance.save import new_figure, save_figure
 
     lines = ["| model | points | seconds | what the solutions are |", "|---|---|---|---|"]
     for model, (_, _, file) in MAPS.items():

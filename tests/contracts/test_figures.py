@@ -41,13 +41,9 @@ from contfric.plot import (
     plot_transition_graph,
     save_figure,
 )
-from contfric.plot.events import marks_of
-from contfric.plot.labels import _MEASURE, _UPDATE, Anchor, lay_out, place_labels
-from contfric.plot.names import event_label, parameter_label, surface_label
-from contfric.plot.orbit import _columns
-from contfric.plot.pieces import pieces_of
-from contfric.plot.runs import aligned, stability_runs, threaded
-from contfric.plot.style import (
+from contfric.plot.appearance.labels import _MEASURE, _UPDATE, Anchor, lay_out, place_labels
+from contfric.plot.appearance.names import event_label, parameter_label, surface_label
+from contfric.plot.appearance.style import (
     BRIDGE_COLOUR,
     BRIDGE_NAME,
     UNSTABLE,
@@ -55,6 +51,10 @@ from contfric.plot.style import (
     domain_colours,
     lighter,
 )
+from contfric.plot.diagrams.events import marks_of
+from contfric.plot.diagrams.runs import aligned, stability_runs, threaded
+from contfric.plot.orbits.orbit import _columns
+from contfric.plot.orbits.pieces import pieces_of
 
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
@@ -271,7 +271,7 @@ def test_of_a_part_of_a_figure_all_of_it_is_written(orbit: Any, tmp_path: Path) 
 def test_the_legend_names_the_widest_of_many_branches(
     diagram: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("contfric.plot.legend._MOST", 2)
+    monkeypatch.setattr("contfric.plot.diagrams.legend._MOST", 2)
     known = entries(plot_diagram(diagram)[0].figure.legends[0])
     names = {b.name for b in diagram.branches if not b.bridge}
     assert names & set(known) == {"2s", "0s"}

@@ -18,9 +18,9 @@ import pytest
 import contfric as cf
 from contfric.base.extras import MissingPackageError
 from contfric.cli import main
+from contfric.plot.appearance.style import ROWS
 from contfric.plot.live import page
 from contfric.plot.live.collect import Detail, floats, kept, local_sizes, quantised
-from contfric.plot.style import ROWS
 
 LARGEST = 2_000_000
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)

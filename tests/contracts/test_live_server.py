@@ -17,8 +17,8 @@ import pytest
 import contfric as cf
 from contfric.atlas.other_parameters import anew
 from contfric.cli import main
+from contfric.plot.appearance.style import ROWS
 from contfric.plot.live.serve import _sliders, answered
-from contfric.plot.style import ROWS
 
 BROWSER, DRIVER = (shutil.which(name) for name in ("chromium", "chromedriver"))
 PARAMS = {"S": 0.32, "S0": 0.45, "h": 0.0, "zeta": 0.0}

@@ -14,9 +14,9 @@ from matplotlib.text import Annotation, Text
 
 import contfric as cf
 from contfric.plot import new_figure, plot_diagram
-from contfric.plot.inset import add_inset, crowd
-from contfric.plot.labels import Anchor, line_pixels, marker_pixels, place_labels
-from contfric.plot.style import _OTHERS, _TYPICAL, MARKERS, STABLE, UNSTABLE
+from contfric.plot.appearance.labels import Anchor, line_pixels, marker_pixels, place_labels
+from contfric.plot.appearance.style import _OTHERS, _TYPICAL, MARKERS, STABLE, UNSTABLE
+from contfric.plot.diagrams.inset import add_inset, crowd
 
 #: Severe colour blindness, in linear RGB (Machado, Oliveira and Fernandes, 2009).
 BLIND = {
@@ -179,7 +179,7 @@ def test_where_events_crowd_is_found(diagram: cf.Diagram) -> None:
 
 
 def _marks(diagram: cf.Diagram) -> Any:
-    from contfric.plot.events import marks_of
+    from contfric.plot.diagrams.events import marks_of
 
     return marks_of(diagram.bifurcations, diagram.branches, "psi", "Omega")
 

@@ -13,7 +13,7 @@ import contfric as cf
 from contfric.base.resources import bundled_dir
 from contfric.models.definition import Model
 from contfric.models.reading.files import from_data, loaded
-from contfric.plot.style import row_of
+from contfric.plot.appearance.style import row_of
 from tests.rescaled import put_in
 
 #: Dry friction that depends on the direction of motion, moved by (Sm - Sp)/2.

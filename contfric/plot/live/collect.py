@@ -15,9 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
-from contfric.plot.events import Mark, marks_of
-from contfric.plot.runs import quantity, stability_runs
-from contfric.plot.style import BRIDGE_COLOUR, ROWS, branch_colours, domain_colours, lighter
+from contfric.plot.appearance.style import (
+    BRIDGE_COLOUR,
+    ROWS,
+    branch_colours,
+    domain_colours,
+    lighter,
+)
+from contfric.plot.diagrams.events import Mark, marks_of
+from contfric.plot.diagrams.runs import quantity, stability_runs
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.base.extras import need_bokeh
 from contfric.base.files import replacing
 from contfric.errors import ParameterError
-from contfric.plot.diagram import fixed_parameters
-from contfric.plot.live.collect import Detail, collect, symbol
-from contfric.plot.names import parameter_label
-from contfric.plot.style import (
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.style import (
     BLACK,
     BLUE,
     BRIDGE_WIDTH,
@@ -29,6 +27,8 @@ from contfric.plot.style import (
     UNKNOWN_WIDTH,
     VERMILLION,
 )
+from contfric.plot.diagrams.diagram import fixed_parameters
+from contfric.plot.live.collect import Detail, collect, symbol
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

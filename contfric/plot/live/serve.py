@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from contfric.base.extras import need_bokeh
 from contfric.errors import ContfricError
+from contfric.plot.appearance.style import ROWS
 from contfric.plot.live.collect import Detail, collect, lines_and_marks, symbol
 from contfric.plot.live.page import fill, fixed_text, resource
-from contfric.plot.style import ROWS
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -93,15 +93,15 @@ class OneParameter(AlongParameter):
         """Draw the diagram, or how its branches are joined."""
         diagram: Diagram = found["diagram"]
         if drawing.kind == "branches":
-            from contfric.plot.branch_graph import plot_branch_graph
-            from contfric.plot.names import title_label
-            from contfric.plot.style import TEXT, sized
+            from contfric.plot.appearance.names import title_label
+            from contfric.plot.appearance.style import TEXT, sized
+            from contfric.plot.diagrams.branch_graph import plot_branch_graph
 
             axes = figure.add_subplot()
             plot_branch_graph(diagram, ax=axes)
             axes.set_title(title_label(title, diagram.model.parameter_names), fontsize=sized(TEXT))
             return
-        from contfric.plot.diagram import plot_diagram
+        from contfric.plot.diagrams.diagram import plot_diagram
 
         rows = [row_name(row) for row in drawing.rows]
         swept = _sweep_of(found, rows)

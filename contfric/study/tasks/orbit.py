@@ -126,7 +126,7 @@ class Start(Task):
         """Draw the orbit, or the graph of transitions with its cycle; neither has a title."""
         orbit: Orbit = found["orbit"]
         if drawing.kind == "orbit":
-            from contfric.plot.orbit import panels_height, plot_orbit_panels
+            from contfric.plot.orbits.orbit import panels_height, plot_orbit_panels
 
             figure.set_size_inches(self.figures["orbit"].width, panels_height(orbit))
             plot_orbit_panels(orbit, fig=figure)

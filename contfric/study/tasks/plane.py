@@ -121,10 +121,10 @@ class PlaneTask(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the curves, over a map of Lyapunov exponents of the same plane."""
+        from contfric.plot.appearance.names import title_label
+        from contfric.plot.appearance.style import TEXT, sized
         from contfric.plot.lyapunov import plot_lyapunov_map
-        from contfric.plot.names import title_label
         from contfric.plot.plane import plot_plane
-        from contfric.plot.style import TEXT, sized
 
         plane, lmap, axes = found["plane"], found.get("lyapunov"), figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:

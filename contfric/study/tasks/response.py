@@ -36,8 +36,8 @@ class Response(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Let the result draw itself, with the parameters that it keeps in the title."""
-        from contfric.plot.names import full_title
-        from contfric.plot.style import TEXT, sized
+        from contfric.plot.appearance.names import full_title
+        from contfric.plot.appearance.style import TEXT, sized
 
         response, axes = found[self.result], figure.add_subplot()
         if self.under in found:

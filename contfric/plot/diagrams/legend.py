@@ -9,10 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from contfric.errors import either
-from contfric.plot.events import Mark
-from contfric.plot.inset import WIDTH, crowd
-from contfric.plot.look import Look
-from contfric.plot.style import (
+from contfric.plot.appearance.style import (
     BRIDGE_COLOUR,
     BRIDGE_NAME,
     BRIDGE_WIDTH,
@@ -25,6 +22,9 @@ from contfric.plot.style import (
     lighter,
     sized,
 )
+from contfric.plot.diagrams.events import Mark
+from contfric.plot.diagrams.inset import WIDTH, crowd
+from contfric.plot.diagrams.look import Look
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch

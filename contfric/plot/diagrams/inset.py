@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.transforms import Bbox
 
 from contfric.errors import ParameterError
-from contfric.plot.events import Mark
-from contfric.plot.labels import line_pixels, marker_pixels
-from contfric.plot.style import SMALL, sized
+from contfric.plot.appearance.labels import line_pixels, marker_pixels
+from contfric.plot.appearance.style import SMALL, sized
+from contfric.plot.diagrams.events import Mark
 
 #: False, True (where events crowd), or the part of the parameter that is enlarged.
 Inset: TypeAlias = bool | tuple[float, float]

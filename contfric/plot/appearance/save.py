@@ -19,7 +19,7 @@ from PIL import Image
 
 from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
-from contfric.plot.style import SMALL, TEXT, sized
+from contfric.plot.appearance.style import SMALL, TEXT, sized
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from contfric.base.arrays import FloatArray
-from contfric.plot.labels import Anchor, near, place_labels
-from contfric.plot.names import event_label
-from contfric.plot.runs import counted, quantity
-from contfric.plot.style import MARKERS, OTHER_MARKER, sized
+from contfric.plot.appearance.labels import Anchor, near, place_labels
+from contfric.plot.appearance.names import event_label
+from contfric.plot.appearance.style import MARKERS, OTHER_MARKER, sized
+from contfric.plot.diagrams.runs import counted, quantity
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch

@@ -10,8 +10,8 @@ from matplotlib.colors import is_color_like
 from matplotlib.lines import Line2D
 
 from contfric.errors import ParameterError, did_you_mean
-from contfric.plot.inset import Inset, checked_inset
-from contfric.plot.style import BRIDGE, STABLE, UNKNOWN, UNSTABLE, branch_colours
+from contfric.plot.appearance.style import BRIDGE, STABLE, UNKNOWN, UNSTABLE, branch_colours
+from contfric.plot.diagrams.inset import Inset, checked_inset
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch

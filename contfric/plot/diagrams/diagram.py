@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from contfric.plot.events import Mark, draw_marks, label_marks, marks_of
-from contfric.plot.inset import Inset, add_inset
-from contfric.plot.labels import lay_out
-from contfric.plot.legend import handles_of
-from contfric.plot.look import LineStyle, Look
-from contfric.plot.names import full_title, parameter_label
-from contfric.plot.response import draw_overlay
-from contfric.plot.runs import stability_runs
-from contfric.plot.save import axes_or_new, figure_or_new, for_journal, legend_of, name_axes
-from contfric.plot.style import (
+from contfric.plot.appearance.labels import lay_out
+from contfric.plot.appearance.names import full_title, parameter_label
+from contfric.plot.appearance.save import (
+    axes_or_new,
+    figure_or_new,
+    for_journal,
+    legend_of,
+    name_axes,
+)
+from contfric.plot.appearance.style import (
     BRIDGE_COLOUR,
     BRIDGE_WIDTH,
     LINE_WIDTH,
@@ -32,6 +32,12 @@ from contfric.plot.style import (
     row_of,
     sized,
 )
+from contfric.plot.diagrams.events import Mark, draw_marks, label_marks, marks_of
+from contfric.plot.diagrams.inset import Inset, add_inset
+from contfric.plot.diagrams.legend import handles_of
+from contfric.plot.diagrams.look import LineStyle, Look
+from contfric.plot.diagrams.runs import stability_runs
+from contfric.plot.response import draw_overlay
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -13,9 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import ScaledTranslation
 
 from contfric.errors import ParameterError
-from contfric.plot.labels import Anchor, lay_out, place_labels
-from contfric.plot.names import fixed_text, parameter_label
-from contfric.plot.orbit_artists import (
+from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
+from contfric.plot.appearance.names import fixed_text, parameter_label
+from contfric.plot.appearance.save import axes_or_new, figure_or_new, name_axes
+from contfric.plot.appearance.style import NEXT_TO, SMALL, TEXT, sized
+from contfric.plot.orbits.orbit_artists import (
     BAND,
     along,
     draw_arrow,
@@ -27,9 +29,7 @@ from contfric.plot.orbit_artists import (
     draw_surfaces,
     legend_handles,
 )
-from contfric.plot.pieces import DomainPiece, pieces_of, rest_bounds
-from contfric.plot.save import axes_or_new, figure_or_new, name_axes
-from contfric.plot.style import NEXT_TO, SMALL, TEXT, sized
+from contfric.plot.orbits.pieces import DomainPiece, pieces_of, rest_bounds
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, path_of, whole_number
-from contfric.plot.names import parameter_label
-from contfric.plot.save import axes_or_new, new_figure
-from contfric.plot.style import BLACK, NEXT_TO, SMALL, branch_colours, sized
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, new_figure
+from contfric.plot.appearance.style import BLACK, NEXT_TO, SMALL, branch_colours, sized
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
@@ -85,7 +85,7 @@ def animate_orbit(orbit: Orbit, path: str | Path, frames: int = 120, rate: int =
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from contfric.plot.orbit import plot_orbit
+    from contfric.plot.orbits.orbit import plot_orbit
 
     path = path_of("the file of an animation", path)
     if path.suffix != ".gif" or not path.absolute().parent.is_dir():

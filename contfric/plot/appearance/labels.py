@@ -21,7 +21,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
-from contfric.plot.style import GREY, SMALL, sized
+from contfric.plot.appearance.style import GREY, SMALL, sized
 
 #: Distances from the point to the label that are tried, in points; leader lines beyond the first.
 _DISTANCES = (5.0, 12.0, 20.0, 30.0, 42.0, 56.0)

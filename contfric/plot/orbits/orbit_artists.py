@@ -13,10 +13,10 @@ from matplotlib.patches import Patch
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
-from contfric.plot.labels import Anchor
-from contfric.plot.names import parameter_label, surface_label
-from contfric.plot.pieces import DomainPiece, rest_bounds, rest_limits
-from contfric.plot.style import BLACK, GREY, SMALL, domain_colours, domain_labels, sized
+from contfric.plot.appearance.labels import Anchor
+from contfric.plot.appearance.names import parameter_label, surface_label
+from contfric.plot.appearance.style import BLACK, GREY, SMALL, domain_colours, domain_labels, sized
+from contfric.plot.orbits.pieces import DomainPiece, rest_bounds, rest_limits
 
 if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit

@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
-from contfric.plot.names import parameter_label
+from contfric.plot.appearance.names import parameter_label
 from contfric.quantities.registry import NAMED, QuantityLike, quantity_of
 
 #: Palette that stays distinguishable to colour-blind readers (M. Okabe and K. Ito, 2008).

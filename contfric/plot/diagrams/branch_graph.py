@@ -18,12 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from contfric.plot.events import draw_event
+from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
+from contfric.plot.appearance.names import event_label, parameter_label
+from contfric.plot.appearance.save import axes_or_new
+from contfric.plot.appearance.style import BRIDGE_COLOUR, GREY, branch_colours
+from contfric.plot.diagrams.events import draw_event
 from contfric.plot.graph import draw_node, frame_nodes
-from contfric.plot.labels import Anchor, lay_out, place_labels
-from contfric.plot.names import event_label, parameter_label
-from contfric.plot.save import axes_or_new
-from contfric.plot.style import BRIDGE_COLOUR, GREY, branch_colours
 
 if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram

@@ -1,0 +1,1 @@
+"""How figures look: names, labels, colours; and how they are written to files."""

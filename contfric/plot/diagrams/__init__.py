@@ -1,0 +1,1 @@
+"""Diagrams drawn: branches with their stability and events, insets, legend, and their graph."""

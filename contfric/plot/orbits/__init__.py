@@ -1,0 +1,1 @@
+"""Orbits and trajectories drawn: in a plane, in time, moving."""
