@@ -34,7 +34,7 @@ from contfric.continuation.points import MOST_POINTS, settings_of
 from contfric.continuation.trace import follow_orbit
 from contfric.errors import ConvergenceError, ParameterError, shown, whole_number
 from contfric.events.bifurcation import Bifurcation
-from contfric.events.candidates import candidates
+from contfric.events.incident.candidates import candidates
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
 from contfric.signature.edits import concatenate

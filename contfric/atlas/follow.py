@@ -44,11 +44,11 @@ from contfric.continuation.families.continuum import in_continuum
 from contfric.continuation.points import Settings
 from contfric.continuation.singular_points.crossing import LOCATED, crossing_near
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
-from contfric.events.candidates import Candidate, sequences_of
-from contfric.events.from_simulation import solutions_near
-from contfric.events.incident import incident_forms, kinds_between
-from contfric.events.jumps import nothing_jumps
-from contfric.events.partial_touches import partial_touches
+from contfric.events.incident.candidates import Candidate, sequences_of
+from contfric.events.incident.from_simulation import solutions_near
+from contfric.events.incident.incident import incident_forms, kinds_between
+from contfric.events.incident.partial_touches import partial_touches
+from contfric.events.local.jumps import nothing_jumps
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit

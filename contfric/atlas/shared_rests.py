@@ -3,9 +3,9 @@
 A hold begins where the solutions of the inclusion are not unique. Where two orbits of the same parameters
 have a hold that begins at the same phase and in the same state, a solution may go on from there with either
 of them each time: every sequence of the two is an orbit. Of k orbits of one period each there are as many of
-n periods as there are aperiodic necklaces, nearly k^n / n (:mod:`contfric.events.sequences`), some of
-which may be symmetry images of each other. They belong to one diagram where events join them; what bounds its
-size is ``max_periods`` alone.
+n periods as there are aperiodic necklaces, nearly k^n / n (:mod:`contfric.events.incident.sequences`), some
+of which may be symmetry images of each other. They belong to one diagram where events join them; what bounds
+its size is ``max_periods`` alone.
 
 So it is with a rest whose load comes to its limit at a maximum in time: place and phase of that rest are
 given by the load. They do not depend on what came before, and persist as the parameter changes.

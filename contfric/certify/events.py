@@ -36,7 +36,7 @@ from contfric.certify.limit import LATE, TimeOverError, check_time
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.errors import ParameterError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
-from contfric.events.touching import rest_at
+from contfric.events.local.touching import rest_at
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, around, column, row_norm, working

@@ -1,9 +1,9 @@
 """What a curve becomes after another sliding event: the same condition in an edited itinerary.
 
 At the event the motion is known, and every itinerary that can follow it solves the same equations there
-(:mod:`contfric.events.candidates`). The condition is found again in the new itinerary by its place: the
-same surface at the same time. SN, BP and PD go on if the new itinerary has the multiplier as well: where the
-solution is differentiable through the event.
+(:mod:`contfric.events.incident.candidates`). The condition is found again in the new itinerary by its place:
+the same surface at the same time. SN, BP and PD go on if the new itinerary has the multiplier as well: where
+the solution is differentiable through the event.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import SpecialPoint
 from contfric.errors import ContfricError, ParameterError
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
-from contfric.events.candidates import candidates
+from contfric.events.incident.candidates import candidates
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.canonical.sections import canonical, moved
 from contfric.orbit.measured.samples import stationary_within

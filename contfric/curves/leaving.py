@@ -39,8 +39,8 @@ from contfric.curves.ranges import PlaneRanges
 from contfric.curves.special import CodimTwo, SpecialPoint
 from contfric.errors import ContfricError, NotationError
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
-from contfric.events.candidates import edited_orbit
-from contfric.events.outcomes import outcome_at
+from contfric.events.incident.candidates import edited_orbit
+from contfric.events.outcomes.outcomes import outcome_at
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
 

@@ -15,9 +15,9 @@ from contfric.bvp.system import EventFunction, Margin, System
 from contfric.curves.ranges import PlaneRanges, limits_of
 from contfric.errors import ParameterError
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Kind
-from contfric.events.jumps import nothing_jumps
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.local.touching import rest_at
 from contfric.events.sliding_kinds import kind_of_margin
-from contfric.events.touching import rest_at
 from contfric.models.definition import Model
 from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit

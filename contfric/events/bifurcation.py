@@ -14,8 +14,8 @@ from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
 from contfric.bvp.system import EventFunction
 from contfric.errors import ParameterError, did_you_mean
+from contfric.events.local.touching import chosen_at, entered_at, thrown_at
 from contfric.events.measured_event import MeasuredEvent
-from contfric.events.touching import chosen_at, entered_at, thrown_at
 from contfric.models.definition import Model
 from contfric.orbit.canonical.slides import Outline
 from contfric.orbit.orbit import Orbit

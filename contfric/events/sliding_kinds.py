@@ -38,8 +38,8 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.holds import Hold
 from contfric.bvp.system import EventFunction, Margin, System, inside_sign
 from contfric.events.bifurcation import Kind
-from contfric.events.jumps import nothing_jumps
-from contfric.events.touching import (
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.local.touching import (
     chosen_at,
     is_corner,
     rate_along,

@@ -23,7 +23,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin, System
 from contfric.events.bifurcation import Bifurcation, Kind
-from contfric.events.zero_acceleration import joint_within
+from contfric.events.local.zero_acceleration import joint_within
 from contfric.orbit.orbit import Orbit
 
 #: Share of the times of pins that all other joints move by where nothing but these moves. At a fold they all

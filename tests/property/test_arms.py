@@ -15,7 +15,7 @@ from contfric.continuation.points import settings_of
 from contfric.continuation.singular_points.arms import arms_at, passages, turning_passages
 from contfric.continuation.singular_points.vertices import undoubled_part
 from contfric.events.bifurcation import Kind
-from contfric.events.sequences import count, lengths
+from contfric.events.incident.sequences import count, lengths
 from contfric.orbit.canonical.distance import cyclic_apart, farthest_apart
 
 #: Random scenes (of seed 31) with folds of bridges of several holds, and most periods of their orbits.

@@ -16,9 +16,9 @@ from report import Tally
 
 import contfric as cf
 from contfric.atlas.completeness.verification import differences
-from contfric.events.conditions import possible, relation_of
-from contfric.events.incident import incident_forms
-from contfric.events.sequences import count, lengths, necklaces
+from contfric.events.incident.conditions import possible, relation_of
+from contfric.events.incident.incident import incident_forms
+from contfric.events.incident.sequences import count, lengths, necklaces
 from contfric.orbit.index import index_at_infinity, index_of, opening_sign
 
 #: Of the first 66 scenes of seed 7: those that are cut at 60 branches, so that nothing is held against

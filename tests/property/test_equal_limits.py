@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.events.jumps import nothing_jumps
+from contfric.events.local.jumps import nothing_jumps
 
 
 def scene(seed: int) -> tuple[cf.Orbit, tuple[float, float]]:

@@ -10,7 +10,7 @@ import pytest
 
 from contfric.atlas.completeness.degenerate import _ALIKE, _alike
 from contfric.base.arrays import FloatArray
-from contfric.events.sequences import necklaces
+from contfric.events.incident.sequences import necklaces
 from contfric.orbit.canonical.slides import Outline
 
 CYCLE = 7.0

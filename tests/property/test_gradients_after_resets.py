@@ -19,7 +19,7 @@ from contfric.base.arrays import FloatArray
 from contfric.base.attributes import altered
 from contfric.bvp.linear import null_space
 from contfric.bvp.system import Margin
-from contfric.events.gradients import closing, gradient_of
+from contfric.events.local.gradients import closing, gradient_of
 from contfric.orbit.solve import refine
 
 WALLS = """

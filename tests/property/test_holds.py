@@ -14,7 +14,7 @@ import contfric as cf
 from contfric.bvp.linear import assembled, jacobian_blocks, tangent_of
 from contfric.continuation.singular_points.vertices import passed_vertex
 from contfric.errors import NotationError
-from contfric.events.unit import form_of, pieces, unit_of
+from contfric.events.incident.unit import form_of, pieces, unit_of
 from contfric.models import load_model
 from contfric.orbit.measured.samples import state_within
 from contfric.signature import (

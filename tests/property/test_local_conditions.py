@@ -12,9 +12,9 @@ from contfric.atlas.diagram import Diagram
 from contfric.bvp.margins import Margin
 from contfric.continuation.branch import Branch
 from contfric.events.bifurcation import Kind
-from contfric.events.conditions import Relation, possible, relation_of
-from contfric.events.gradients import gradient_of
-from contfric.events.incident import incident_forms, vanishing
+from contfric.events.incident.conditions import Relation, possible, relation_of
+from contfric.events.incident.incident import incident_forms, vanishing
+from contfric.events.local.gradients import gradient_of
 from contfric.events.locations import normal_location
 from contfric.signature.holds import is_hold
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.events.partial_touches import _choices
+from contfric.events.incident.partial_touches import _choices
 
 STOP = """
 name: stop

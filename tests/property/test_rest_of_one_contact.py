@@ -11,7 +11,7 @@ import pytest
 import contfric as cf
 from contfric.bvp.system import EventFunction, Margin
 from contfric.events.bifurcation import Kind
-from contfric.events.touching import resting_domain
+from contfric.events.local.touching import resting_domain
 from contfric.models.definition import Domain
 from tests.random_structures import drawn
 

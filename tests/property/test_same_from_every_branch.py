@@ -16,7 +16,7 @@ from contfric.continuation.locating import smooth
 from contfric.continuation.points import LARGEST_STEP
 from contfric.continuation.singular_points.folds import fold_at
 from contfric.events.bifurcation import Kind
-from contfric.events.incident import Name, kinds_between
+from contfric.events.incident.incident import Name, kinds_between
 
 #: A bridge turns over 1e-8 of its range.
 FOLD = {"Omega": 0.07742262128103025, "S0": 0.13762082006748685, "h": 0.0, "zeta": 1e-9}

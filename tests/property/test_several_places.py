@@ -10,9 +10,9 @@ import pytest
 import contfric as cf
 from contfric.atlas.leaving.several_locations import Opening, opening_together
 from contfric.events.bifurcation import TERMINAL
-from contfric.events.candidates import sequences_of
-from contfric.events.incident import Incident, incident_forms
-from contfric.events.unit import Form
+from contfric.events.incident.candidates import sequences_of
+from contfric.events.incident.incident import Incident, incident_forms
+from contfric.events.incident.unit import Form
 
 #: A static limit far above the kinetic one: rest may be left where its acceleration falls through zero.
 SCENE = {"Omega": 0.2935828642, "S": 0.122850703873, "S0": 0.49363345839, "h": 0.143075872}

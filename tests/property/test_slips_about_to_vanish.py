@@ -10,8 +10,8 @@ import pytest
 import contfric as cf
 from contfric.bvp.system import inside_sign
 from contfric.events.bifurcation import ACCURACY
-from contfric.events.incident import incident_forms
-from contfric.events.zero_acceleration import only_comes_back
+from contfric.events.incident.incident import incident_forms
+from contfric.events.local.zero_acceleration import only_comes_back
 
 SAMPLES = 2001
 

@@ -12,7 +12,7 @@ import pytest
 
 import contfric as cf
 from contfric.events.bifurcation import ACCURACY
-from contfric.events.standing_slides import goes_nowhere
+from contfric.events.outcomes.standing_slides import goes_nowhere
 
 NEAR = {
     "k": 5.41325782573,

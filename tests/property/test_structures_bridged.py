@@ -10,7 +10,7 @@ import pytest
 
 import contfric as cf
 from contfric.bvp.linear import equations_at
-from contfric.events.candidates import candidates
+from contfric.events.incident.candidates import candidates
 
 PARAMETERS = {"w": 0.667, "F": 0.5, "k": 1.0, "c": 0.05, "vd": 0.6, "S": 0.25, "S0": 0.35, "d": 0.9}
 

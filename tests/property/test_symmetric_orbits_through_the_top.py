@@ -10,7 +10,7 @@ import pytest
 import contfric as cf
 from contfric.atlas.leaving.families import solved_next_to
 from contfric.continuation.points import settings_of
-from contfric.events.candidates import candidates
+from contfric.events.incident.candidates import candidates
 
 #: A pendulum whose symmetric oscillation reaches the top, and how far parameters are moved (relative).
 PENDULUM = {"A": 0.465475689, "W": 0.598549604, "c": 0.258974202, "mu": 0.100688116}

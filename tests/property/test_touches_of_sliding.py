@@ -13,7 +13,7 @@ import contfric as cf
 from contfric.base.attributes import altered
 from contfric.bvp.system import Margin
 from contfric.events.bifurcation import ACCURACY
-from contfric.events.gradients import gradient_of
+from contfric.events.local.gradients import gradient_of
 
 ABOUT = {
     "zeta": 0.0481491523,

@@ -24,8 +24,8 @@ from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
 from contfric.errors import ContfricError
 from contfric.events.bifurcation import Bifurcation, EndReason, Kind
-from contfric.events.touching import leads_elsewhere
-from contfric.events.unit import unit_of
+from contfric.events.incident.unit import unit_of
+from contfric.events.local.touching import leads_elsewhere
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

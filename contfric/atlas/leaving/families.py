@@ -17,7 +17,7 @@ from contfric.continuation.families.vertical import family_near
 from contfric.continuation.points import Settings, next_to
 from contfric.continuation.trace import follow_family
 from contfric.events.bifurcation import TERMINAL, End, Kind
-from contfric.events.candidates import candidates
+from contfric.events.incident.candidates import candidates
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

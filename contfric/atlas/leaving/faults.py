@@ -11,7 +11,7 @@ from contfric.base.arrays import FloatArray
 from contfric.continuation.accuracy.moved_by_errors import duration_error
 from contfric.continuation.branch import Branch
 from contfric.continuation.located_event import ROUGH
-from contfric.events.standing_slides import STANDS, goes_nowhere
+from contfric.events.outcomes.standing_slides import STANDS, goes_nowhere
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit

@@ -18,7 +18,7 @@ from contfric.continuation.singular_points.arms import Arms, arms_at
 from contfric.continuation.singular_points.switching import NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import Decision, EndReason, Kind
-from contfric.events.sequences import MOST_SEQUENCES, count, lengths, necklaces
+from contfric.events.incident.sequences import MOST_SEQUENCES, count, lengths, necklaces
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
 

@@ -17,7 +17,7 @@ from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.matching import same_event
 from contfric.continuation.branch import Branch
-from contfric.events.candidates import Candidate
+from contfric.events.incident.candidates import Candidate
 from contfric.orbit.orbit import Orbit
 
 #: Why other orders of the changes are not tried.

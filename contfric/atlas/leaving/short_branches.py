@@ -39,8 +39,8 @@ from contfric.continuation.singular_points.vertices import (
     undoubled_part,
 )
 from contfric.events.bifurcation import TERMINAL, Bifurcation, Decision, End, EndReason, Kind
-from contfric.events.candidates import Candidate
 from contfric.events.doubling_point import solved_at_vertex
+from contfric.events.incident.candidates import Candidate
 from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
 

@@ -21,7 +21,7 @@ from contfric.continuation.points import Point, Settings, displaced
 from contfric.continuation.singular_points.switching import LEAVE, NEARER, start_beside
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
-from contfric.events.candidates import Candidate, directions
+from contfric.events.incident.candidates import Candidate, directions
 from contfric.orbit.orbit import Orbit
 
 #: First step away from an event, in largest steps: the new itinerary is proved close to it. Where the

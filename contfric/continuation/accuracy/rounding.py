@@ -24,14 +24,14 @@ from contfric.continuation.accuracy.moved_by_errors import UNITS, fold_error, mo
 from contfric.continuation.points import Point, Settings
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
 from contfric.events.doubling_point import opening
-from contfric.events.gradients import (
+from contfric.events.local.gradients import (
     before_reset,
     carried,
     closing,
     gradient_of,
     surface_gradient,
 )
-from contfric.events.zero_acceleration import joint_within, stationary_values
+from contfric.events.local.zero_acceleration import joint_within, stationary_values
 from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine

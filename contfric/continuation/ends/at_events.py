@@ -15,11 +15,11 @@ from contfric.continuation.points import Point, Settings
 from contfric.continuation.singular_points.vertices import at_vertex
 from contfric.errors import NotationError
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.events.holdable import NoJump
-from contfric.events.jumps import nothing_jumps
+from contfric.events.local.holdable import NoJump
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.local.touching import entered_at, is_crossed, thrown_at
 from contfric.events.locations import locations_of
-from contfric.events.outcomes import outcome_at
-from contfric.events.touching import entered_at, is_crossed, thrown_at
+from contfric.events.outcomes.outcomes import outcome_at
 from contfric.orbit.canonical.sections import is_smooth
 from contfric.orbit.canonical.slides import SHORT
 from contfric.orbit.measured.samples import stationary_within

@@ -13,10 +13,10 @@ from contfric.continuation.locating.change_of_sign import locate_change
 from contfric.continuation.locating.vanishing_together import nearer_than_twins, with_holds_forward
 from contfric.continuation.points import Point, Settings
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
-from contfric.events.jumps import nothing_jumps
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.local.touching import is_rate_of
+from contfric.events.outcomes.standing_slides import goes_nowhere
 from contfric.events.sliding_kinds import bends_outward, hold_of_test, kind_of_margin
-from contfric.events.standing_slides import goes_nowhere
-from contfric.events.touching import is_rate_of
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest, is_hold
 

@@ -28,7 +28,7 @@ from contfric.bvp.system import System
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings
 from contfric.errors import NotationError
-from contfric.events.unit import Form, Unit, form_of, pieces, unit_of
+from contfric.events.incident.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 

@@ -7,8 +7,8 @@ from functools import cache
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.jumps import leaving_rate, nothing_jumps
-from contfric.events.touching import is_rate_of
+from contfric.events.local.jumps import leaving_rate, nothing_jumps
+from contfric.events.local.touching import is_rate_of
 from contfric.models.definition import Model
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest

@@ -7,9 +7,9 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.holdable import vanishes_with
-from contfric.events.jumps import left_to
-from contfric.events.zero_acceleration import touch_of
+from contfric.events.local.holdable import vanishes_with
+from contfric.events.local.jumps import left_to
+from contfric.events.local.zero_acceleration import touch_of
 from contfric.orbit.orbit import Orbit
 
 #: A hold this short is one that vanishes: what its margins say is its length.

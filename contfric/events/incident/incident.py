@@ -2,7 +2,7 @@
 
 At an event one motion solves the equations of several itineraries. The itineraries differ at **locations** of
 the motion only: a stop on the limit, a touch inside of a stick, a stop without acceleration, a touch of rest
-inside of a slide. At each location there are few local outcomes (:mod:`contfric.events.outcomes`).
+inside of a slide. At each location there are few local outcomes (:mod:`contfric.events.outcomes.outcomes`).
 Which itineraries there are is a property of the motion, not of the branch that came to it. So they are
 collected as a closure:
 
@@ -12,7 +12,7 @@ collected as a closure:
 3. Every margin that vanishes on an orbit of one form gives an outcome; the form with that outcome is a form,
    too. This is repeated until nothing new appears.
 
-An orbit at the event is a cyclic sequence of forms (:mod:`contfric.events.sequences`).
+An orbit at the event is a cyclic sequence of forms (:mod:`contfric.events.incident.sequences`).
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from contfric.base.attributes import altered
 from contfric.bvp.system import EventFunction, Itinerary, Margin, build_system
 from contfric.errors import NotationError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
+from contfric.events.incident.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.events.locations import TANGENTIAL, locations_of, normal_location
-from contfric.events.outcomes import (
+from contfric.events.outcomes.outcomes import (
     NO_LENGTH_AT_TOUCH,
     RestsForEver,
     Successor,
     outcome_at,
 )
 from contfric.events.sliding_kinds import kind_of_margin
-from contfric.events.unit import Form, Unit, form_of, pieces, unit_of
 from contfric.orbit.canonical.section_joints import divided
 from contfric.orbit.canonical.sections import named_by_ends
 from contfric.orbit.canonical.slides import SAME_SOLUTION, SHORT, resting_modes, time_unit

@@ -30,8 +30,8 @@ more: there it ends, with a slide of length zero, and the rest of the stick foll
 
 Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
 of Filippov): rest whose load touches its limit slips there for no time, and a slide that touches rest sticks
-there for no time (:mod:`contfric.events.standing_slides`). Where nothing else is known,
-:mod:`contfric.events.from_simulation` lets the flow itself say what follows.
+there for no time (:mod:`contfric.events.outcomes.standing_slides`). Where nothing else is known,
+:mod:`contfric.events.incident.from_simulation` lets the flow itself say what follows.
 """
 
 from __future__ import annotations
@@ -42,11 +42,8 @@ from dataclasses import dataclass, field
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events import standing_slides as slides
 from contfric.events.bifurcation import Kind
-from contfric.events.contact_outcomes import continuous_edit
-from contfric.events.grazing_impacts import grazing_impact, impact_at_joint
-from contfric.events.holdable import (
+from contfric.events.local.holdable import (
     NoJump,
     check_held,
     check_inside,
@@ -54,12 +51,15 @@ from contfric.events.holdable import (
     rest_mode,
     vanishes_with,
 )
-from contfric.events.touching import chosen_at, crossed_at, entered_at
-from contfric.events.zero_acceleration import (
+from contfric.events.local.touching import chosen_at, crossed_at, entered_at
+from contfric.events.local.zero_acceleration import (
     first_zero_acceleration,
     touch_of,
     touches_again,
 )
+from contfric.events.outcomes import standing_slides as slides
+from contfric.events.outcomes.contact_outcomes import continuous_edit
+from contfric.events.outcomes.grazing_impacts import grazing_impact, impact_at_joint
 from contfric.models.definition import Model
 from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit

@@ -35,8 +35,8 @@ from typing import TYPE_CHECKING
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Itinerary, Margin
 from contfric.errors import NotationError
-from contfric.events.touching import coming_back, second_rate
-from contfric.events.zero_acceleration import only_comes_back, touch_of
+from contfric.events.local.touching import coming_back, second_rate
+from contfric.events.local.zero_acceleration import only_comes_back, touch_of
 from contfric.models.definition import Model
 from contfric.models.growing_model import ComposedModel
 from contfric.orbit.orbit import Orbit
@@ -146,7 +146,7 @@ def _touched(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, 
 def crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit at the touch of a surface that is crossed: the time beyond it begins, or vanishes.
 
-    How fast the joints move apart: :func:`~contfric.events.touching.speeds_of_crossing`.
+    How fast the joints move apart: :func:`~contfric.events.local.touching.speeds_of_crossing`.
     """
     i, surface = location.segment, location.surface
     if location.margin is Margin.JOINT:

@@ -15,10 +15,10 @@ from __future__ import annotations
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.contact_outcomes import Joints, Speeds
-from contfric.events.holdable import NO_JUMP, NoJump, leaves_smoothly
-from contfric.events.jumps import nothing_jumps
-from contfric.events.touching import rate_along, rate_scale
+from contfric.events.local.holdable import NO_JUMP, NoJump, leaves_smoothly
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.local.touching import rate_along, rate_scale
+from contfric.events.outcomes.contact_outcomes import Joints, Speeds
 from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
 from contfric.signature.edits import Edit, drop, insert, split

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from contfric.bvp.system import EventFunction, Margin
 from contfric.errors import NotationError
-from contfric.events.contact_outcomes import Joints, crossed
-from contfric.events.standing_slides import runs_on
-from contfric.events.touching import thrown_at
-from contfric.events.zero_acceleration import touch_of
+from contfric.events.local.touching import thrown_at
+from contfric.events.local.zero_acceleration import touch_of
+from contfric.events.outcomes.contact_outcomes import Joints, crossed
+from contfric.events.outcomes.standing_slides import runs_on
 from contfric.models.definition import Model
 from contfric.orbit.canonical.section_joints import crossed_at_graze
 from contfric.orbit.orbit import Orbit

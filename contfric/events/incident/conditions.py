@@ -1,6 +1,6 @@
 """Local conditions: which sequences of forms can exist near an event, to first order.
 
-A form (:mod:`contfric.events.incident`) relates the joint u that a unit begins with to the joint u'
+A form (:mod:`contfric.events.incident.incident`) relates the joint u that a unit begins with to the joint u'
 that it ends with, and to the distance lambda in the parameter:
 
     P u + Q u' + c lambda + sum_j d_j q_j = 0,        q_j >= 0,
@@ -36,11 +36,11 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.linear import jacobian_blocks, linearised
 from contfric.bvp.system import EventFunction, Margin
-from contfric.events.gradients import closing, gradient_of
-from contfric.events.incident import vanishing
-from contfric.events.jumps import nothing_jumps
-from contfric.events.outcomes import NEARLY_NO_LENGTH
-from contfric.events.unit import Form
+from contfric.events.incident.incident import vanishing
+from contfric.events.incident.unit import Form
+from contfric.events.local.gradients import closing, gradient_of
+from contfric.events.local.jumps import nothing_jumps
+from contfric.events.outcomes.outcomes import NEARLY_NO_LENGTH
 from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import TOUCH, ends_rest, is_hold

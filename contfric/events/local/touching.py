@@ -11,7 +11,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin, System
 from contfric.errors import NotationError
-from contfric.events.zero_acceleration import touch_of
+from contfric.events.local.zero_acceleration import touch_of
 from contfric.models.definition import Domain, Model
 from contfric.models.mode_domains import is_section
 from contfric.models.view import FlowView

@@ -32,17 +32,17 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import EventFunction, Margin, build_system
 from contfric.errors import NotationError
 from contfric.events.bifurcation import Bifurcation
-from contfric.events.candidates import Candidate, along_motion
-from contfric.events.incident import edited_whole, vanishing
-from contfric.events.outcomes import Successor, outcome_at
-from contfric.events.touching import (
+from contfric.events.incident.candidates import Candidate, along_motion
+from contfric.events.incident.incident import edited_whole, vanishing
+from contfric.events.local.touching import (
     coming_back,
     crossed_at,
     is_crossed,
     second_rate,
     speeds_of_crossing,
 )
-from contfric.events.zero_acceleration import touch_of
+from contfric.events.local.zero_acceleration import touch_of
+from contfric.events.outcomes.outcomes import Successor, outcome_at
 from contfric.orbit.canonical.sections import canonical, is_smooth
 from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.clock import clocked

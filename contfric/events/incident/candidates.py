@@ -1,9 +1,10 @@
 """Candidates for what follows a sliding event: orbits of other itineraries, at the event itself.
 
-The motion at the event solves the equations of several itineraries (:mod:`contfric.events.incident`),
-over one period or several (:mod:`contfric.events.sequences`). Each is a candidate, unless the local
-conditions exclude it (:mod:`contfric.events.conditions`). The segments that come in have length zero,
-and those that are held have their pins.
+The motion at the event solves the equations of several itineraries
+(:mod:`contfric.events.incident.incident`), over one period or several
+(:mod:`contfric.events.incident.sequences`). Each is a candidate, unless the local conditions exclude it
+(:mod:`contfric.events.incident.conditions`). The segments that come in have length zero, and those that are
+held have their pins.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from contfric.bvp.linear import tangent_of
 from contfric.bvp.system import Itinerary, build_system
 from contfric.errors import NotationError
 from contfric.events.bifurcation import Bifurcation
-from contfric.events.conditions import Relation, possible, relation_of
-from contfric.events.incident import Incident, edited_whole, incident_forms
-from contfric.events.outcomes import Successor
-from contfric.events.sequences import MOST_SEQUENCES, count, lengths, necklaces
-from contfric.events.unit import Form, Unit
+from contfric.events.incident.conditions import Relation, possible, relation_of
+from contfric.events.incident.incident import Incident, edited_whole, incident_forms
+from contfric.events.incident.sequences import MOST_SEQUENCES, count, lengths, necklaces
+from contfric.events.incident.unit import Form, Unit
+from contfric.events.outcomes.outcomes import Successor
 from contfric.orbit.canonical.sections import canonical, is_smooth, joints_left
 from contfric.orbit.canonical.slides import SAME_SOLUTION
 from contfric.orbit.clock import clocked

@@ -1,7 +1,7 @@
 """The unit of a motion: its shortest period (half of it if it is its own symmetry image); its itineraries.
 
-A motion at an event solves the equations of several itineraries (:mod:`contfric.events.incident`). It
-is cut at the start of a slide of some length, which every itinerary has; each itinerary of a unit is a
+A motion at an event solves the equations of several itineraries (:mod:`contfric.events.incident.incident`).
+It is cut at the start of a slide of some length, which every itinerary has; each itinerary of a unit is a
 **form**.
 """
 

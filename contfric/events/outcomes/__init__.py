@@ -1,0 +1,1 @@
+"""What can follow an event at one of its locations."""
