@@ -177,7 +177,7 @@ class _Run:
         if orbit is None:
             self.folder.discard_if_empty()
             return
-        path = self.folder.free_name("orbit-of-failed-run", ".npz")
+        path = self.folder.free_name("orbit-of-failed-run")
         try:
             save(orbit, path)
         except ResultFileError:
@@ -287,11 +287,11 @@ class Folder:
         for name in names:
             remove_leftovers(self.path / name)
 
-    def free_name(self, stem: str, suffix: str) -> Path:
+    def free_name(self, stem: str) -> Path:
         """Return a file name that is not taken yet: ``stem.npz``, ``stem-2.npz``, ..."""
-        path, number = self.path / f"{stem}{suffix}", 2
+        path, number = self.path / f"{stem}.npz", 2
         while path.exists():
-            path, number = self.path / f"{stem}-{number}{suffix}", number + 1
+            path, number = self.path / f"{stem}-{number}.npz", number + 1
         return path
 
 

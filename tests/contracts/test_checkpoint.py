@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from contfric.continuation.points import Point
 from contfric.events.bifurcation import Decision
 from contfric.remember import journal
 from contfric.remember.journal import Journal, keeping, remembered
-from contfric.remember.stored import Reader, UnstorableError, Writer
+from contfric.remember.stored import _MOVED, Reader, UnstorableError, Writer, _class
 from contfric.study import checkpoint
 
 HEAD = "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\n"
@@ -301,6 +302,17 @@ def test_nothing_but_data_classes_of_the_package_is_made(node) -> None:
     tree = json.dumps(node).encode()
     with pytest.raises(UnstorableError):
         Reader(len(tree).to_bytes(8, "little") + tree).value()
+
+
+@pytest.mark.parametrize(("then", "now"), sorted(_MOVED.items()))
+def test_classes_of_modules_that_moved_are_found_by_their_earlier_paths(
+    then: str, now: str
+) -> None:
+    here = [c for c in vars(import_module(now)).values() if getattr(c, "__module__", "") == now]
+    kinds = [c for c in here if isinstance(c, type)]
+    assert kinds
+    for kind in kinds:
+        assert _class(f"{then}:{kind.__qualname__}", object) is kind
 
 
 @pytest.mark.parametrize(

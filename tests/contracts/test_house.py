@@ -6,12 +6,15 @@ import os
 import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "contfric"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 400
+#: Modules in one folder: more of them get folders of their own, by the questions that they answer.
+MAX_MODULES = 25
 
 #: Loaded by those functions that need them, never by `import contfric`.
 HEAVY = (
@@ -67,3 +70,8 @@ def test_modules_are_short() -> None:
         name_of(module): len(module.read_text(encoding="utf-8").splitlines()) for module in MODULES
     }
     assert not {name: count for name, count in lines.items() if count >= MAX_LINES}, "split them"
+
+
+def test_folders_are_short() -> None:
+    counts = Counter(name_of(module.parent) for module in MODULES)
+    assert not {name: count for name, count in counts.items() if count > MAX_MODULES}, "split them"

@@ -154,9 +154,9 @@ def lighter(colour: str, share: float = 0.45) -> str:
     return _mixed(colour, 1.0, share)
 
 
-def greyish(colour: str, share: float = 0.55) -> str:
+def greyish(colour: str) -> str:
     """Return a colour mixed with grey."""
-    return _mixed(colour, 0.6, share)
+    return _mixed(colour, 0.6, 0.55)
 
 
 def _mixed(colour: str, other: float, share: float) -> str:
