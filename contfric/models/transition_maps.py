@@ -155,7 +155,11 @@ class TransitionMaps(ChatterMaps):
                     named = {
                         d.own_mode
                         for d in found
-                        if all(s in slid or d.signs[s] == v for s, v in target.signs.items())
+                        if d.signs == target.signs
+                        or (
+                            slid
+                            and all(s in slid or d.signs[s] == v for s, v in target.signs.items())
+                        )
                     }
                     several = len(named) > 1 if mapped else len(fits) > 1
                     if several and not (not mapped and domain.mode in fits):
