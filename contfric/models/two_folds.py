@@ -52,6 +52,9 @@ _ZERO = 1e-9
 _SAME, _ON = 1e-6, 1e-9
 #: Second derivatives, and gradients that depend on each other, are zero below this share.
 _FLAT, _RANK = 1e-8, 1e-8
+#: Places next to a two-fold, how far they are, and Newton's steps that put them onto the surface. Rates that
+#: differ do so by about their slopes times that distance; rounding is far below a thousandth of it.
+_NEIGHBOURS, _NEAR, _ONTO, _JUMP = 30, 1e-4, 3, 1e-7
 #: Unknowns of the three equations.
 _LEAST = 3
 
@@ -275,7 +278,7 @@ def _of_pair(tangencies: _Tangencies, starts: int, seed: int, dimension: int) ->
         if z is None or not tangencies.is_regular(z, sizes):
             continue
         z[0] = z[0] % period if period else 0.0
-        if _adjoins(tangencies, z):
+        if _adjoins(tangencies, z) and _jumps_near(tangencies, z, sizes):
             found.append((z, _two_fold(tangencies, z, dimension)))
     found.sort(key=lambda item: float(np.linalg.norm(item[0] / sizes)))
     kept: list[tuple[FloatArray, TwoFold]] = []
@@ -314,6 +317,28 @@ def _adjoins(tangencies: _Tangencies, z: FloatArray) -> bool:
         )
         for mode, side in ((tangencies.above, 1), (tangencies.below, -1))
     )
+
+
+def _jumps_near(tangencies: _Tangencies, z: FloatArray, sizes: FloatArray) -> bool:
+    """Tell whether the rates of both modes differ on the surface near a place, where both modes hold.
+
+    Else the field is continuous there, and solutions are unique: two levels of a saturation meet.
+    """
+    rng = np.random.default_rng(0)
+    fixed = tangencies.model.autonomous
+    for _ in range(_NEIGHBOURS):
+        near = z + _NEAR * sizes * rng.standard_normal(len(z))
+        near[0] = z[0] if fixed else near[0]
+        for _ in range(_ONTO):
+            gradient = tangencies.jacobian(near)[0] * sizes
+            height = tangencies.equations(near, tangencies.vector)[0]
+            near = near - height * gradient / (gradient @ gradient) * sizes
+        if not _adjoins(tangencies, near):
+            continue
+        _, up, down = tangencies.equations(near, tangencies.vector)
+        if abs(up - down) > _JUMP * np.max(np.abs(tangencies.jacobian(near)[1:] * sizes)):
+            return True
+    return False
 
 
 def _two_fold(tangencies: _Tangencies, z: FloatArray, dimension: int) -> TwoFold:

@@ -177,10 +177,8 @@ def _rules(model: Model) -> tuple[IntArray, IntArray]:
             for after in targets:  # after a reset the signs of the mapped state tell the domain
                 if model.domain_by_name[after].own_mode in model.chatter_by_mode:
                     continue  # found by following the impacts
-                signs, before = model.domain_by_name[after].signs, model.domain_by_name[name].signs
-                slid = {s for s, v in before.items() if v == 0 and not model.changed_by(reset, s)}
-                if source in model.chatter_by_mode:
-                    slid = set()  # thrown off a wall, or against it: the side a little after tells
+                signs = model.domain_by_name[after].signs
+                slid = model.slid_before(model.domain_by_name[name], surface)
                 add(name, surface, signs, {*_landed(model, source, surface), *slid}, after)
     for own in model.chatters:
         for domain, (lift, _) in product(model.domains_of(own.mode), own.ways):

@@ -46,6 +46,11 @@ WORDS = {
         *(("minus_down", "switch"), ("plus_down", "kink")),
     },
     "sampled": {("on", "tick"), ("off", "tick")},
+    "reactor": {
+        *(("up", "phase"), ("up-", "zero"), ("down", "zero"), ("down-", "phase")),
+        *(("off-", "pulse"), ("off+", "pulse")),
+    },
+    "chua": {("x-", "right"), ("x-", "left"), ("x0", "left")},
     "knob": {("turns", "phi+")},
     "theta": {("turns-", "spike"), ("turns+", "th+")},
     "dry": {("forward", "stop"), ("backward", "stop"), ("slide", "slide-"), ("slide", "slide+")},

@@ -273,7 +273,10 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
         )
     for surface in (s for s, side in reset.lands.items() if side != 0):
         rate, mode = probe.rate(fits[0].own_mode, surface, t, behind), fits[0].own_mode
-        if not max(d.signs[surface] * rate for d in fits if d.own_mode == mode) > 0.0:
+        away = max(d.signs[surface] * rate for d in fits if d.own_mode == mode)
+        if abs(rate) <= _STILL * (1.0 + abs(probe.rate(before.own_mode, name, t, y))):
+            continue  # a plastic impact: it rests on the surface, and forces say for how long
+        if not away > 0.0:
             observable = model.surface_by_name[surface].observable
             return (
                 f"{where} still runs into the surface '{surface}': a reset must turn the rate of "

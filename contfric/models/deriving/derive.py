@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -110,13 +110,25 @@ def model_from(description: Description) -> Model:
     for domain, surface, modes in model.undecided():
         if not _meets(sampler, domain, surface):
             continue
-        raise EntryError(
-            ("modes", modes[-1], "in"),
-            f"a solution that meets '{surface}' in '{domain.name}' could go on in {' or '.join(modes)}: give "
-            f"them a side of a surface that divides them, or write a reset at '{surface}' with "
-            f"'to: {modes[0]}'",
-        )
+        raise _undecided(model, domain, surface, modes)
     return model
+
+
+def _undecided(model: Model, domain: Domain, surface: str, modes: Sequence[str]) -> EntryError:
+    """Return how to say in which of several modes motion goes on."""
+    where = (
+        f"a solution that meets '{surface}' in '{domain.name}' could go on in {' or '.join(modes)}"
+    )
+    if model.maps_at(domain, surface):
+        each = ", ".join(
+            f"{mode}: {{...: {side}}}" for mode, side in zip(modes, "+-", strict=False)
+        )
+        advice = (
+            f"tell by the sides of other surfaces which one: 'to: {{{each}}}' in the reset there"
+        )
+        return EntryError(("resets", surface), f"{where}: {advice}")
+    advice = f"them a side of a surface that divides them, or write a reset at '{surface}' with"
+    return EntryError(("modes", modes[-1], "in"), f"{where}: give {advice} 'to: {modes[0]}'")
 
 
 def as_described(

@@ -33,6 +33,10 @@ class SectionMaps:
         def transitions(self) -> dict[tuple[str, str], str]:
             """Next domain for each possible (domain, surface)."""
 
+        @cached_property
+        def targets(self) -> dict[tuple[str, str], tuple[str, ...]]:
+            """The domains that may follow where several may, by (domain, surface)."""
+
         def cuts(self, surface: str) -> bool:
             """Return whether motion is cut at a surface."""
 
@@ -158,7 +162,23 @@ class SectionMaps:
         ends = zip(walk, (*walk[1:], *walk[:1]), strict=True)
         if any(a != b and self.shown(a) == self.shown(b) for a, b in ends):
             return list(walk)
-        return [self.shown(name) for name in walk]
+        shown = [self.shown(name) for name in walk]
+        # a mode that the phase divides lies on one side of it, and leads to others on that side
+        return list(walk) if self._leads_on(walk) and not self._leads_on(shown) else shown
+
+    def _leads_on(self, walk: Sequence[str]) -> bool:
+        """Tell whether each domain of a cyclic walk can follow the one before, but for resets and holds."""
+        pairs = zip(walk, (*walk[1:], *walk[:1]), strict=True)
+        return all(b in self._followers.get(a, (b,)) for a, b in pairs if b in self._followers)
+
+    @cached_property
+    def _followers(self) -> dict[str, set[str]]:
+        found: dict[str, set[str]] = {domain.name: set() for domain in self.domains}
+        for (name, _), target in self.transitions.items():
+            found[name].add(target)
+        for (name, _), targets in self.targets.items():
+            found[name].update(targets)
+        return found
 
     @property
     def stops_at_joints(self) -> bool:

@@ -147,11 +147,20 @@ class TransitionMaps(ChatterMaps):
                     for d in self.targets.get((domain.name, surface.name), ())
                 ]
                 mapped = self.maps_at(domain, surface.name)
+                slid = self.slid_before(domain, surface.name)
                 for target in found:
                     behind = self._domains_by_signs[self._chosen_at(domain, surface, target)]
                     fits = {d.mode for d in nearest(behind, domain.own_mode, self._side_of)}
                     fits |= {d.mode for d in behind if d.mode == domain.mode}
-                    named = {d.own_mode for d in found if d.signs == target.signs}
+                    named = {
+                        d.own_mode
+                        for d in found
+                        if d.signs == target.signs
+                        or (
+                            slid
+                            and all(s in slid or d.signs[s] == v for s, v in target.signs.items())
+                        )
+                    }
                     several = len(named) > 1 if mapped else len(fits) > 1
                     if several and not (not mapped and domain.mode in fits):
                         yield domain, surface.name, tuple(sorted(named if mapped else fits))
@@ -242,16 +251,23 @@ class TransitionMaps(ChatterMaps):
     def _led_away(self, asked: Mapping[str, int], reset: Reset, before: Domain) -> list[Domain]:
         """Return the domains of modes that a reset names next to surfaces that motion slid on before."""
         slid = {s for s, side in asked.items() if side == 0 and s not in reset.lands}
-        named = {
-            lead.mode for lead in reset.leads if not lead.after or before.own_mode in lead.after
-        }
+        leads = [lead for lead in reset.leads if not lead.after or before.own_mode in lead.after]
         return [
             d
             for d in self.domains
             if slid
-            and d.own_mode in named
+            and any(
+                d.own_mode == own.mode and own.where.items() <= d.signs.items() for own in leads
+            )
             and all(d.signs[s] == side or (s in slid and d.signs[s]) for s, side in asked.items())
         ]
+
+    def slid_before(self, domain: Domain, surface: str) -> set[str]:
+        """Return the surfaces that motion slid on before a reset, which is on none of their sides then."""
+        reset = self.reset_at(domain.own_mode, surface)
+        if reset is None or domain.own_mode in self.chatter_by_mode:
+            return set()  # thrown off a wall, or against it: the side a little after tells
+        return {s for s, v in domain.signs.items() if v == 0 and not self.changed_by(reset, s)}
 
     def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""

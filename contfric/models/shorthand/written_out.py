@@ -17,6 +17,7 @@ from contfric.models.described.reset_modes import FROM, TO, named_parts
 from contfric.models.entries import EntryError, as_identifier
 from contfric.models.language.grammar import PERIOD, RESERVED
 from contfric.models.shorthand.angles import with_angles
+from contfric.models.shorthand.between import modes_between
 from contfric.models.shorthand.centre import centred
 from contfric.models.shorthand.clocks import value_at_defaults, with_clock
 from contfric.models.shorthand.tied import with_ties_put_in
@@ -38,6 +39,12 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
     """
     if not data["surfaces"] and not data["modes"] and "field" in data:
         data = {**data, **_smooth(data)}
+    elif (
+        not data["modes"]
+        and "field" in data
+        and not data["surfaces"].keys() & data["resets"].keys()
+    ):
+        data = {**data, "modes": modes_between(data)}
     elif not data["surfaces"] and len(data["modes"]) == 1:
         data = {**data, **_smooth_mode(data)}
     data = centred(_with_observables(_with_period(with_ties_put_in(data))))
