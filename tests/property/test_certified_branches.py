@@ -426,6 +426,25 @@ def test_a_branch_that_starts_near_a_saddle_is_covered_from_where_its_orbits_are
     assert [piece.stop for piece in found.pieces[:-1]] == [p.start for p in found.pieces[1:]]
 
 
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_period_without_bound_at_a_limit_of_the_parameter_takes_few_boxes(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Orbits next to the limit differ by less than any box is wide; all others are proved."""
+    rng = np.random.default_rng(seed)
+    params = {"outside": rng.uniform(0, 10), "tau": rng.uniform(2, 8), "low": rng.uniform(15, 20)}
+    params |= {"high": params["low"] + rng.uniform(0.5, 3), "heat": 30.0}
+    limit = params["high"] - params["outside"]
+    branch = cf.continue_orbit(cf.find_orbit("thermostat", params), "heat", (5.0, 32.0))
+    assert branch.values[0] == pytest.approx(limit, abs=1e-12)
+    monkeypatch.setattr(tracing, "_MOST", 2 * len(branch))
+    found = certify_branch(branch)
+    assert not found.ended
+    away = [piece for piece in found.pieces if min(piece.values) - limit > 1e-13]
+    assert all(piece.proved and piece.regular for piece in away)
+    assert found.covered > 0.7
+
+
 @pytest.mark.parametrize("start", [1, 5])
 def test_parts_that_are_covered_in_another_order_are_one_curve(start: int) -> None:
     """The same as in the order of the branch, wherever the first printed orbit that is alone is."""

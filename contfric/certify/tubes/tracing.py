@@ -44,8 +44,8 @@ _WAYS = (0.5, 0.25, 0.125)
 _PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
-#: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
-#: the equations are singular all along (a continuum) halving is of no use.
+#: After so many shortest stretches in a row without a proof no others are halved, until one is proved: where
+#: the equations are singular all along (a continuum, a period without bound) halving is of no use.
 _IN_ROW = 8
 
 Arcs = tuple[float, float]
@@ -282,7 +282,7 @@ class Tracer(Strand):
         self.proved_length = length if whole else self.proved_length
         self.length = max(self.length, length) if whole else math.inf
         self.steady = self.steady + 1 if whole else _STEADY
-        self.missed = 0 if box is not None else self.missed + 1
+        self.missed = self.missed + 1 if admissible.verdict is Verdict.UNDECIDED else 0
         if box is None or piece is None:
             return [self._nothing(arcs, first, last)]
         return [self.linked(piece, box)]
