@@ -16,7 +16,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.system import build_system
 from contfric.certify.branch import certify_branch, cover
-from contfric.certify.equations import locating
+from contfric.certify.equations import shortest
 from contfric.certify.equations.chain import Chain, segments_of
 from contfric.certify.inequalities.along_segments import RATE
 from contfric.certify.tubes import tracing
@@ -538,7 +538,7 @@ def test_the_shortest_problem_of_a_cycle_without_excitation(seed: int, turns: in
         EventFunction(Margin.INTERIOR, k, "switch") for k in range(last % len(cycle), last + 1, 4)
     )
     whole = replace(orbit, system=system, joints=joints)
-    short, _ = locating._shortest(whole, tests)
+    short, _ = shortest._shortest(whole, tests)
     assert short.system.half and len(short.joints) == len(cycle) // 2
     chain = Chain(segments_of(short.system), ball_model(model, short.params))
     off = chain.residual([arb(float(c)) for c in short.joints.ravel()])

@@ -140,12 +140,15 @@ def test_a_branch_ends_where_the_wall_is_just_touched(folder: Path) -> None:
     assert branch.certify().complete
 
 
-@pytest.mark.parametrize("seed", [3, 7])
+@pytest.mark.parametrize("seed", [3, 7, 12])
 def test_a_branch_with_an_impact_is_proved_up_to_its_graze(seed: int, folder: Path) -> None:
-    """The impact, the velocity after it and the way back from the wall vanish together."""
+    """The impact, the velocity after it and the way back from the wall vanish together.
+
+    One of these branches hits the wall in every second period: it ends on an orbit of one period.
+    """
     own = scene(seed)
     place = furthest(own, 60)
-    branch = followed(own | {"d": 0.98 * place}, "d", 0.95, 1.2, folder)
+    branch = followed(own | {"d": 0.99 * place}, "d", 0.98, 1.1, folder)
     assert branch.ends[1].reason.name == "GS"
     assert any(exit_ == "wall" for _, exit_ in branch[0].itinerary)
     proof = branch.certify()
