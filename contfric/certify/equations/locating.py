@@ -112,7 +112,7 @@ def _released(
     acceleration goes on as the rest that follows. One without length is no hold, and the stick before it is
     left where the load is stationary. What is left of the others is that their pin is met. Where the stick up
     to a touch of its limit vanishes, the hold after it starts at a stop on the limit, the load being
-    stationary.
+    stationary. Where a hold after a touch has no length, one slide touches rest.
     """
     system, (first, last) = orbit.system, (0, 0)
     for k, test in enumerate(tests):
@@ -125,6 +125,12 @@ def _released(
             vanished = test.segment == i  # the hold itself; else the stick before it
             exit_ = limit if vanished else hold_at(limit)
             moved, (first, last) = EventFunction(Margin.EXIT, i - 2 + vanished, limit), (i - 1, i)
+        elif _only_touches(orbit, hold, test):
+            rest, exit_ = system.itinerary[i + 1]
+            moved, (first, last) = (
+                EventFunction(Margin.INTERIOR, i - 1, hold.leaves),
+                (i - 1, i + 1),
+            )
         else:
             exit_ = _end_of(orbit, hold, test)
             moved = (
@@ -157,6 +163,16 @@ def _ends(test: EventFunction, hold: Hold) -> bool:
     if test.margin is Margin.LASTING:
         return hold.after_rest and hold.segment - test.segment in (0, 1)
     return test.segment == hold.segment and test.margin in (Margin.JOINT, Margin.EXIT)
+
+
+def _only_touches(orbit: Orbit, hold: Hold, test: EventFunction) -> bool:
+    """Tell whether a hold after a touch of rest has no length, so that the slide before it goes on."""
+    itinerary, i = orbit.system.itinerary, hold.segment
+    if test.margin is not Margin.EXIT or hold.pin is not None or hold.after_rest:
+        return False
+    if not 0 < i < len(itinerary) - 1 or itinerary[i - 1][0] != itinerary[i + 1][0]:
+        return False
+    return bool(orbit.ends[i, 0] - orbit.begins[i, 0] < VANISHED)
 
 
 def _end_of(orbit: Orbit, hold: Hold, test: EventFunction) -> str:

@@ -173,9 +173,9 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
             return None
     elif not names:
         return None
-    tangential = any(name.what == EXIT and tracer.is_tangential(name.segment) for name in names)
+    singular = any(tracer.is_singular(name) for name in names)
     leaves = forward if names else None
-    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), leaves, tangential)
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), leaves, singular)
     if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)

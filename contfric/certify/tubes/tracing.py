@@ -294,24 +294,24 @@ class Tracer(Strand):
         values: tuple[arb, arb],
         admissible: Finding,
         leaves: bool | None = None,
-        tangential: bool = False,
+        singular: bool = False,
     ) -> Piece:
         """Return what is proved of a box, but for its link.
 
         Parameters
         ----------
         leaves : whether the branch ends in it on the way to its last point; to its first one if False
-        tangential : whether it ends at a tangential stop, at which the chain is singular
+        singular : whether the chain is singular where it ends, as at a tangential stop
         """
         events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
         inside = tuple(label for label, _, _ in events)
         points: list[Vector | None] = [None, None]
         if leaves is not None:
             points[leaves] = next((zero for _, zero, ends in events if ends), None)
-        folds = 0 if box.monotone else self._count(box, 1, points, tangential)
+        folds = 0 if box.monotone else self._count(box, 1, points, singular)
         # orbits with holds have no multipliers: the least disturbance ends a hold
         held = bool(self.system.holds)
-        flips = 0 if held or box.no_flip else self._count(box, -1, points, tangential)
+        flips = 0 if held or box.no_flip else self._count(box, -1, points, singular)
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = held or has_no_pair(self.segments, self.plain, self.closes, box)
         tori = 0 if off else UNKNOWN
@@ -319,20 +319,20 @@ class Tracer(Strand):
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
 
     def _count(
-        self, box: Box, sigma: int, points: list[Vector | None], tangential: bool = False
+        self, box: Box, sigma: int, points: list[Vector | None], singular: bool = False
     ) -> int:
         """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
 
         Parameters
         ----------
         points : solutions on its curve in the place of its ends, where the branch ends at one
-        tangential : whether that one is the place where it is singular
+        singular : whether that one is the place where it is singular
         """
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
         for last, known in enumerate(points):
-            if known and tangential:
+            if known and singular:
                 continue
             at = known or section(self.segments, self.plain, box, bool(last))
             if at is None:
