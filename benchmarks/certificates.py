@@ -9,6 +9,7 @@ python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the p
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
 python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
+python -m benchmarks.certificates horseshoes 100   changed horseshoes: how many false ones are proved
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from contfric.certify.tubes.tube_file import tubes_of
 from contfric.errors import ContfricError
 from contfric.models.balls.build import ball_model
 from contfric.verify.file import check_text
-from tests import tube_oracle
+from tests import release_oracle, tube_oracle
 from tests.certificate_oracle import false_statements, mutated
 from tests.contracts.test_event_files import KINDS, files
 from tests.event_oracle import changed, false_event
@@ -251,6 +252,17 @@ def cheats(count: int) -> None:
     print(Counter(known), f"{time.process_time() - begin:.1f} s of the processor")
 
 
+def horseshoes(count: int) -> None:
+    """Change a true horseshoe, and try to prove the statements that are false in 60 digits."""
+    rng, found, begin = np.random.default_rng(29), Counter[str](), time.process_time()
+    for _ in range(count):
+        stated = release_oracle.changed(release_oracle.STATED, rng)
+        wrong = release_oracle.false_intervals(stated)
+        proved = any(release_oracle.proves(stated, interval) for interval in wrong)
+        found["PROVED, BUT FALSE" if proved else "false, refused" if wrong else "true"] += 1
+    print(dict(found), f"{time.process_time() - begin:.1f} s of the processor")
+
+
 def _changed_tube(data: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     return tube_oracle.changed(tube_oracle.cut(data, rng), rng)
 
@@ -290,7 +302,7 @@ def _certificates(rng: np.random.Generator) -> list[str]:
 
 if __name__ == "__main__":
     task, *counts = sys.argv[1:] or ["orbits"]
-    tasks = {"orbits": orbits, "cheats": cheats, "models": models}
+    tasks = {"orbits": orbits, "cheats": cheats, "models": models, "horseshoes": horseshoes}
     if task == "figures":
         figures(counts[0] if counts else ".")
     elif task in tasks:

@@ -244,12 +244,15 @@ def certify_branch(
 def _parts(tracer: Tracer) -> list[tuple[int, int]]:
     """Return the parts of a branch in the order in which they are to be covered: numbers of their points.
 
-    Where it starts without an event (near a saddle, say) its equations may be nearly singular, so that the
-    boxes of a few steps would take all the time. So it is covered from the first printed orbit on that is
-    proved to be alone, and then from parts next to that towards the start.
+    Where its period has no bound towards its start (near a saddle, say) its equations may be nearly singular
+    for many steps, whose boxes would take all the time. So it is covered from the first printed orbit on that
+    is proved to be alone, and then from parts next to that towards the start. At most limits of the parameter
+    only the first orbits, which one step covers, are not alone.
     """
-    at_event = tracer.has_edge(0) or tracer.flips[0] is not None
-    start = 0 if at_event else min(tracer.unique, default=0)
+    start = min(tracer.unique, default=0)
+    at_event = tracer.flips[0] is not None or (tracer.has_edge(0) and not tracer.is_limit(0))
+    if at_event or (tracer.is_limit(0) and start <= tracer.after(0)):
+        start = 0
     last = len(tracer.branch) - 1
     parts = [(start, last)] if start < last else []
     while start > 0:

@@ -30,7 +30,8 @@ from contfric.certify.equations.extended import (
     with_pair,
 )
 from contfric.certify.equations.kept import Kept, with_kept
-from contfric.certify.equations.locating import EventPlace, NotLocatedError, location_of
+from contfric.certify.equations.locating import EventPlace, location_of
+from contfric.certify.equations.shortest import NotLocatedError
 from contfric.certify.inequalities.along_segments import Touch, grazes_at_end, inequalities
 from contfric.certify.limit import LATE, TimeOverError, check_time
 from contfric.certify.verdict import Finding, Verdict, all_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -200,6 +201,19 @@ def test_a_graze_is_told_from_a_miss(gap: str) -> None:
         assert positive(path, row, 0, False).proved
         path, row = oscillation(f"-0.{'9' * int(gap[3:])}")
         assert positive(path, row, 0, False).verdict is Verdict.REFUTED
+
+
+@pytest.mark.parametrize(("duration", "wanted"), [(1e-9, True), (3.0, True), (3.2, False)])
+def test_what_is_not_negative_at_the_start_is_positive_where_it_rises(
+    duration: float, wanted: bool
+) -> None:
+    """``sin t`` from about 0 on: that it is not below 0 there must be known."""
+    with ctx.workprec(128):
+        path, row = oscillation("0", start=-math.pi / 2, duration=duration)
+        about = Path(path.field, path.start + arb_mat([[0], [arb(0, 1e-6)], [0]]), path.duration)
+        assert not positive(about, row, 0, 0).proved
+        assert positive(about, row, 0, 0, rises=True).proved is wanted
+        assert not positive(about, -row, 0, 0, rises=True).proved
 
 
 def test_an_exact_touch_is_undecided_unless_it_is_known() -> None:

@@ -16,9 +16,9 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.system import build_system
 from contfric.certify.branch import certify_branch, cover
-from contfric.certify.equations import locating
+from contfric.certify.equations import shortest
 from contfric.certify.equations.chain import Chain, segments_of
-from contfric.certify.inequalities.along_segments import RATE
+from contfric.certify.inequalities.along_segments import DURATION, EXIT, RATE, InequalityName
 from contfric.certify.tubes import tracing
 from contfric.certify.tubes.strand import Strand, in_phases
 from contfric.certify.tubes.tracing import Tracer
@@ -28,6 +28,7 @@ from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
 from contfric.models.balls.numbers import Vector, working
 from contfric.orbit.solve import refine
+from contfric.signature.holds import TOUCH
 
 SCENE = {"Omega": 0.55, "S": 0.32, "S0": 0.4}
 
@@ -332,6 +333,23 @@ def test_what_vanishes_identically_in_the_parameters_is_known_along_a_branch(
     assert proof.complete, (proof.gaps, proof.open)
 
 
+def test_a_hold_after_a_touch_begins_with_no_duration() -> None:
+    """There S is stationary along the curve of solutions: it moves with the square of the duration."""
+    params = {"Omega": 0.396, "S": 0.1010915, "S0": 0.4}
+    diagram = cf.explore(cf.find_orbit("coulomb", params), "S", (0.10108, 0.1010926))
+    branch = next(one for one in diagram.branches if one.system.half and one.system.holds)
+    (k,) = (k for k, (_, exit_) in enumerate(branch.system.itinerary) if exit_ == TOUCH)
+    lasts = np.array([orbit.ends[k, 0] - orbit.begins[k, 0] for orbit in branch])
+    assert lasts[0] < 1e-8
+    ratios = (branch.values[5:9] - branch.values[0]) / lasts[5:9] ** 2
+    assert np.ptp(ratios) < 0.1 * abs(np.mean(ratios))
+    arrays = {name: getattr(branch, name)[:9] for name in ("values", "joints", "arc", "labels")}
+    found = certify_branch(replace(branch, **arrays))
+    assert DURATION in {name.what for name in found.pieces[0].ends}
+    assert found.pieces[0].events
+    assert all(piece.proved and piece.linked and not piece.folds for piece in found.pieces)
+
+
 def test_a_tube_ends_at_a_tangential_stop() -> None:
     """Where a stop becomes tangential the chain is singular, and the parameter turns on its curve."""
     orbit = cf.solve_orbit("coulomb", "1a-9seg", {"Omega": 0.5, "S": 0.04, "S0": 0.4})
@@ -344,7 +362,8 @@ def test_a_tube_ends_at_a_tangential_stop() -> None:
     stops = [i for i, mode in enumerate(tracer.segments.modes) if mode != "stick"]
     after = [tracer.segments.modes[(i + 1) % tracer.segments.count] for i in stops]
     # not where the next slide has another acceleration: then the chain is regular at a tangential stop
-    assert [tracer.is_tangential(i) for i in stops] == [mode == "stick" for mode in after]
+    singular = [tracer.is_singular(InequalityName(i, "v", EXIT)) for i in stops]
+    assert singular == [mode == "stick" for mode in after]
     assert "stick" in after and len(set(after)) > 1
 
 
@@ -424,6 +443,25 @@ def test_a_branch_that_starts_near_a_saddle_is_covered_from_where_its_orbits_are
     assert all(piece.proved and piece.regular for piece in pieces)
     assert all(piece.linked for piece in pieces[1:])
     assert [piece.stop for piece in found.pieces[:-1]] == [p.start for p in found.pieces[1:]]
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_period_without_bound_at_a_limit_of_the_parameter_takes_few_boxes(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Orbits next to the limit differ by less than any box is wide; all others are proved."""
+    rng = np.random.default_rng(seed)
+    params = {"outside": rng.uniform(0, 10), "tau": rng.uniform(2, 8), "low": rng.uniform(15, 20)}
+    params |= {"high": params["low"] + rng.uniform(0.5, 3), "heat": 30.0}
+    limit = params["high"] - params["outside"]
+    branch = cf.continue_orbit(cf.find_orbit("thermostat", params), "heat", (5.0, 32.0))
+    assert branch.values[0] == pytest.approx(limit, abs=1e-12)
+    monkeypatch.setattr(tracing, "_MOST", 2 * len(branch))
+    found = certify_branch(branch)
+    assert not found.ended
+    away = [piece for piece in found.pieces if min(piece.values) - limit > 1e-13]
+    assert all(piece.proved and piece.regular for piece in away)
+    assert found.covered > 0.7
 
 
 @pytest.mark.parametrize("start", [1, 5])
@@ -519,7 +557,7 @@ def test_the_shortest_problem_of_a_cycle_without_excitation(seed: int, turns: in
         EventFunction(Margin.INTERIOR, k, "switch") for k in range(last % len(cycle), last + 1, 4)
     )
     whole = replace(orbit, system=system, joints=joints)
-    short, _ = locating._shortest(whole, tests)
+    short, _ = shortest._shortest(whole, tests)
     assert short.system.half and len(short.joints) == len(cycle) // 2
     chain = Chain(segments_of(short.system), ball_model(model, short.params))
     off = chain.residual([arb(float(c)) for c in short.joints.ravel()])

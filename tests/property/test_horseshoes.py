@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flint import arb, ctx
@@ -11,6 +13,7 @@ from contfric.certify.horseshoe import Horseshoe
 from contfric.certify.releases.returns import Release, ReturnMap
 from contfric.certify.releases.stretch import LineInS, UndecidedError
 from contfric.response.returns import ReleaseMap
+from tests.release_oracle import STATED, Releases, changed, false_intervals, proves
 
 PARAMS = {"Omega": 0.396, "S": 0.082, "S0": 0.4}
 RELEASE = Release("stick", "F+", "v", 1, 5, "F-")
@@ -61,6 +64,32 @@ def test_a_horseshoe_is_proved(sampled: ReleaseMap) -> None:
         images = [sampled.cobweb(t, found.returns + 1)[-1] for t in interval]
         assert min(images) < found.window[0]
         assert max(images) > found.window[1]
+
+
+@pytest.mark.slow
+def test_no_false_horseshoe_is_proved() -> None:
+    """Decided in 60 digits, by stepping: of windows that end next to the image of an interval, too."""
+    rng, refused = np.random.default_rng(11), 0
+    assert false_intervals(STATED) == []
+    for _ in range(12):
+        stated = changed(STATED, rng)
+        for interval in false_intervals(stated):
+            refused += 1
+            assert not proves(stated, interval), stated
+    assert refused > 5
+
+
+@pytest.mark.parametrize(("by", "holds"), [(1e-12, True), (-1e-12, False)])
+def test_a_window_that_is_just_covered_is_told_from_one_that_is_not(by: float, holds: bool) -> None:
+    """The window ends next to the image of an end of a short piece; the images are those of 60 digits."""
+    (a, b), releases = STATED.intervals[0], Releases(STATED.params)
+    piece = (a, a + 1e-5 * (b - a))
+    turn = float(releases.truth.turn)
+    ends = sorted(float(releases.image(t, 6)[0]) % turn for t in piece)
+    assert 1e-6 < ends[1] - ends[0] < 0.1
+    stated = replace(STATED, window=(ends[0] + by, ends[1] - by), intervals=(piece,))
+    assert (false_intervals(stated) == []) is holds
+    assert proves(stated, piece) is holds
 
 
 def test_order_is_undecided() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import contfric as cf
+from contfric.certify.equations.chain import Chain, segments_of
+from contfric.certify.tubes.circle import has_real_pair
 from contfric.models.balls.build import ball_model
+from contfric.models.balls.numbers import working
 
 MODEL = """
 name: friction-and-wall
@@ -134,6 +138,60 @@ def test_a_branch_ends_where_the_wall_is_just_touched(folder: Path) -> None:
     branch = followed(own | {"d": 1.02 * place}, "d", 0.9, 1.05, folder)
     assert branch.ends[0].reason.name == "GS"
     assert branch.certify().complete
+
+
+@pytest.mark.parametrize("seed", [3, 7, 12])
+def test_a_branch_with_an_impact_is_proved_up_to_its_graze(seed: int, folder: Path) -> None:
+    """The impact, the velocity after it and the way back from the wall vanish together.
+
+    One of these branches hits the wall in every second period: it ends on an orbit of one period.
+    """
+    own = scene(seed)
+    place = furthest(own, 60)
+    branch = followed(own | {"d": 0.99 * place}, "d", 0.98, 1.1, folder)
+    assert branch.ends[1].reason.name == "GS"
+    assert any(exit_ == "wall" for _, exit_ in branch[0].itinerary)
+    proof = branch.certify()
+    assert proof.complete, proof.gaps + proof.open
+    assert branch.values[-1] == pytest.approx(place, abs=1e-9)
+    assert {"exit", "entry", "rate at the start"} <= {name.what for name in proof.pieces[-1].ends}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_branch_without_impacts_is_proved_up_to_the_wall(seed: int) -> None:
+    """The amplitude of a linear oscillator is known; its first segment starts at the wall."""
+    rng = np.random.default_rng(seed)
+    w, c = rng.uniform(0.4, 1.6), rng.uniform(0.05, 0.4)
+    moved = 1 / complex(1 - w * w, c * w)
+    place, state = abs(moved), [moved.real, (1j * w * moved).real]
+    orbit = cf.find_orbit("impact", {"w": w, "c": c, "d": 1.1 * place}, state=state)
+    proof = cf.continue_orbit(orbit, "d", (0.8 * place, 1.2 * place)).certify()
+    assert proof.branch.values.min() == pytest.approx(place, rel=1e-12)
+    assert proof.covered == 1.0, proof.gaps
+    assert all(piece.linked for piece in proof.pieces[1:])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_pair_on_the_circle_is_seen_in_the_chain(seed: int) -> None:
+    """Without damping and impacts the multipliers are on the circle; with damping their product is not 1."""
+    rng = np.random.default_rng(seed)
+    w = rng.uniform(0.4, 0.9) + 0.7 * (seed % 2)
+    orbit = cf.find_orbit("impact", {"w": w, "c": 0.3, "d": 50.0})
+    segments, size = segments_of(orbit.system), 1 / abs(1 - w * w)
+    start = math.pi / w if w < 1 else 0.0  # the least place
+    joints = [start, -size, 0, start + math.pi / w, size, 0]
+    assert segments.modes == ("up", "down")
+
+    def denied(damping: float, spread: float = 0.0) -> bool:
+        balls = ball_model(orbit.model, orbit.params | {"c": damping})
+        fields = {name: field + arb(0, spread) * field for name, field in balls.fields.items()}
+        chain = Chain(segments, replace(balls, fields=fields, slopes=None))
+        with working(80):
+            return has_real_pair(chain, [arb(x) for x in joints])
+
+    assert not denied(0.0)
+    assert not denied(0.0, 1e-6) and not denied(1e-4, 1e-2)
+    assert denied(1e-4) and denied(-1e-4)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -12,31 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from flint import arb, arb_mat
 
-from contfric.base.arrays import FloatArray
-from contfric.bvp.holds import Hold, Itinerary
+from contfric.bvp.holds import Hold
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.system import build_system
 from contfric.certify.equations.extended import EventCondition
-from contfric.errors import ContfricError
+from contfric.certify.equations.shortest import VANISHED, NotLocatedError, simplest
 from contfric.events.bifurcation import Bifurcation, Kind
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.numbers import column
-from contfric.models.definition import Model
-from contfric.orbit.itinerary.itineraries import half_of
 from contfric.orbit.measured.samples import stationary_within
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import hold_at, is_hold
 
-#: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.
-_VANISHED = 1e-7
 #: A touch of the limit by a hold that starts on it is at its start if it is no later.
 _AT_START = 1e-5
 #: Times in a hold at which the acceleration is looked at: Newton's method goes on from the least one.
 _TIMES = 500
-
-
-class NotLocatedError(ContfricError):
-    """What happens at an event is not known well enough for a proof; the message says what."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +60,7 @@ def location_of(event: Bifurcation) -> EventPlace:
     if not tests:
         return EventPlace(_multiplier_orbit(event), None)
     try:
-        orbit, found = _shortest(orbit, tests)
+        orbit, found = simplest(orbit, tests)
     except NotLocatedError:
         condition = _two_at_once(orbit) if event.kind in (Kind.CS, Kind.T) else None
         if condition is None:
@@ -103,7 +94,7 @@ def _two_at_once(orbit: Orbit) -> EventCondition | None:
     """Return that two contacts change at the same time: the only segment that vanishes is the one between."""
     itinerary, resets = orbit.system.itinerary, orbit.system.layout.resets
     lasts = orbit.ends[:, 0] - orbit.begins[:, 0]
-    found = [i for i in range(len(itinerary)) if lasts[i] < _VANISHED]
+    found = [i for i in range(len(itinerary)) if lasts[i] < VANISHED]
     if len(found) != 1 or found[0] == 0:
         return None
     i = found[0]
@@ -121,7 +112,7 @@ def _released(
     acceleration goes on as the rest that follows. One without length is no hold, and the stick before it is
     left where the load is stationary. What is left of the others is that their pin is met. Where the stick up
     to a touch of its limit vanishes, the hold after it starts at a stop on the limit, the load being
-    stationary.
+    stationary. Where a hold after a touch has no length, one slide touches rest.
     """
     system, (first, last) = orbit.system, (0, 0)
     for k, test in enumerate(tests):
@@ -134,6 +125,12 @@ def _released(
             vanished = test.segment == i  # the hold itself; else the stick before it
             exit_ = limit if vanished else hold_at(limit)
             moved, (first, last) = EventFunction(Margin.EXIT, i - 2 + vanished, limit), (i - 1, i)
+        elif _only_touches(orbit, hold, test):
+            rest, exit_ = system.itinerary[i + 1]
+            moved, (first, last) = (
+                EventFunction(Margin.INTERIOR, i - 1, hold.leaves),
+                (i - 1, i + 1),
+            )
         else:
             exit_ = _end_of(orbit, hold, test)
             moved = (
@@ -168,13 +165,23 @@ def _ends(test: EventFunction, hold: Hold) -> bool:
     return test.segment == hold.segment and test.margin in (Margin.JOINT, Margin.EXIT)
 
 
+def _only_touches(orbit: Orbit, hold: Hold, test: EventFunction) -> bool:
+    """Tell whether a hold after a touch of rest has no length, so that the slide before it goes on."""
+    itinerary, i = orbit.system.itinerary, hold.segment
+    if test.margin is not Margin.EXIT or hold.pin is not None or hold.after_rest:
+        return False
+    if not 0 < i < len(itinerary) - 1 or itinerary[i - 1][0] != itinerary[i + 1][0]:
+        return False
+    return bool(orbit.ends[i, 0] - orbit.begins[i, 0] < VANISHED)
+
+
 def _end_of(orbit: Orbit, hold: Hold, test: EventFunction) -> str:
     """Return the exit of the rest that a hold is at the event."""
     itinerary, i = orbit.system.itinerary, hold.segment
     if test.margin is Margin.JOINT:
         return test.surface
     lasts = orbit.ends[i + 1 : i + 2, 0] - orbit.begins[i + 1 : i + 2, 0]
-    if i + 2 < len(itinerary) and itinerary[i + 2][0] == itinerary[i][0] and lasts[0] < _VANISHED:
+    if i + 2 < len(itinerary) and itinerary[i + 2][0] == itinerary[i][0] and lasts[0] < VANISHED:
         return itinerary[i + 2][1]
     raise NotLocatedError("a hold that is left without acceleration into a slide is not proved")
 
@@ -200,121 +207,6 @@ def _multiplier_orbit(event: Bifurcation) -> Orbit:
     elif event.kind not in (Kind.SN, Kind.NS):
         raise NotLocatedError(f"{event.kind.value} is not proved")
     return orbit
-
-
-def _shortest(orbit: Orbit, tests: tuple[EventFunction, ...]) -> tuple[Orbit, list[EventFunction]]:
-    """Return an orbit without vanished segments, on its half if it is symmetric; and the tests there."""
-    whole, model = orbit.as_whole(), orbit.model
-    segments, tests = _lasting(whole, tests)
-    kept, itinerary = list(segments), tuple(segments.values())
-    joints = whole.cycle[kept]
-    times = _repeats(itinerary, joints, whole)
-    if times > 1:
-        count, periods = len(kept) // times, whole.periods // times
-        itinerary, joints = itinerary[:count], _dated(whole, joints[:count], whole.period / times)
-        tests = tuple(
-            replace(t, segment=kept[kept.index(t.segment) % count])
-            for t in tests
-            if t.segment in kept
-        )
-        short = build_system(model, itinerary, periods)
-        whole, kept = replace(whole, system=short, joints=joints), kept[:count]
-    half = half_of(model, itinerary, whole.periods)
-    if half is not None and _is_symmetric(model, joints, whole.period):
-        itinerary, joints = half, _dated(whole, joints[: len(half)], whole.period / 2)
-    else:
-        half = None
-    try:
-        system = build_system(model, itinerary, whole.periods, half=half is not None)
-    except (KeyError, ValueError) as error:
-        raise NotLocatedError(f"no orbit is left without the vanished segments ({error})") from None
-    found: list[EventFunction] = []
-    for test in tests:
-        at, surface = kept.index(test.segment) if test.segment in kept else -1, test.surface
-        if at < 0:
-            continue
-        if half is not None and at >= len(half) and model.symmetry is not None:
-            back = {image: name for name, image in model.symmetry.surfaces.items()}
-            at, surface = at - len(half), back.get(surface, surface)
-        moved = EventFunction(test.margin, at, surface)
-        if moved not in found:
-            found.append(moved)
-    least = replace(whole, system=system, joints=joints)
-    return least, [test for test in found if not _is_kept(least, test, found)]
-
-
-def _dated(orbit: Orbit, joints: FloatArray, turn: float) -> FloatArray:
-    """Return the joints of a turn at the times of its problem: without excitation it ends at time 0."""
-    joints = joints.copy()
-    if orbit.model.autonomous:
-        joints[:, 0] -= joints[0, 0] + turn
-    return joints
-
-
-def _lasting(
-    orbit: Orbit, tests: tuple[EventFunction, ...]
-) -> tuple[dict[int, tuple[str, str]], tuple[EventFunction, ...]]:
-    """Return mode and exit of the segments of an orbit that last, by number; and tests of these.
-
-    Two of one mode, between which only vanished ones are, are one that touches the exit of the first. What
-    vanishes behind an impact without speed does not move on: the segment before it ends where that one does.
-    """
-    count, resets, lasts = len(orbit.durations), orbit.system.layout.resets, orbit.durations
-    found = {i: orbit.itinerary[i] for i in range(count) if lasts[i] > _VANISHED}
-    for i in [i for i in found if (i + 1) % count not in found]:
-        if i not in found:  # a part of the one before it by now
-            continue
-        gone = (i + 1) % count
-        after = next(k % count for k in range(gone, gone + count) if k % count in found)
-        (mode, exit_), margin = found[i], Margin.EXIT
-        if resets[gone] >= 0:
-            exit_, margin = orbit.itinerary[gone][1], Margin.JOINT
-        elif after != i and found[after][0] == mode and resets[after] < 0:
-            exit_, margin = found.pop(after)[1], Margin.INTERIOR
-        found[i] = mode, exit_
-        tests = tuple(
-            replace(t, margin=margin) if (t.segment, t.margin) == (i, Margin.EXIT) else t
-            for t in tests
-        )
-    return found, tests
-
-
-def _is_kept(orbit: Orbit, test: EventFunction, tests: list[EventFunction]) -> bool:
-    """Tell whether a surface is met at the end of a segment because it is met at its start, as in rest."""
-    i, half = test.segment, orbit.system.half
-    before = replace(test, segment=(i or orbit.system.segments * (not half)) - 1)
-    if test.margin is not Margin.JOINT or before not in tests or before == test:
-        return False
-    if orbit.system.layout.resets[i] >= 0:
-        return False
-    balls = ball_model(orbit.model, orbit.params)
-    return balls.keeps(balls.rows[test.surface], orbit.system.itinerary[i][0])
-
-
-def _repeats(itinerary: Itinerary, joints: FloatArray, orbit: Orbit) -> int:
-    """Return how often an orbit of some joints repeats itself within its period."""
-    for times in range(orbit.periods, 1, -1):
-        count = len(itinerary) // times
-        if (
-            orbit.periods % times
-            or len(itinerary) % times
-            or itinerary[count:] != itinerary[:-count]
-        ):
-            continue
-        off = joints[count:] - joints[:-count]
-        off[:, 0] -= orbit.period / times
-        if np.max(np.abs(off)) < _VANISHED:
-            return times
-    return 1
-
-
-def _is_symmetric(model: Model, joints: FloatArray, period: float) -> bool:
-    assert model.symmetry is not None
-    n = len(joints) // 2
-    image = joints[:n].copy()
-    image[:, 0] += 0.5 * period
-    image[:, 1:] = image[:, 1:] @ model.symmetry.array().T
-    return bool(np.max(np.abs(image - joints[n:])) < _VANISHED)
 
 
 def _tangency(orbit: Orbit, test: EventFunction) -> EventPlace:

@@ -138,7 +138,7 @@ def inequalities(
             if name in loose and grazes_at_end(EventCondition(i, surface), segments, model):
                 ends = 2  # its rate vanishes at the end, too
             # an observable that is not negative at the start is as good as one that is zero
-            least = InequalityName(i - 1, surface, JOINT) in loose and i and not segments.resets[i]
+            least = _before(segments, i, surface) in loose and not segments.resets[i]
             at = segments.modes[i], zeros, surface, int(least)
             order = order_at_start(model, model.rows[surface], *at)
             if order and all(x.is_zero() for x in numbers(row * path.field)):
@@ -149,7 +149,7 @@ def inequalities(
                 finding = touched(path, row, order, None)
             else:
                 bends = InequalityName(i, surface, EXIT) in loose
-                rises = order == 1 and InequalityName(i, surface, RATE) in loose
+                rises = order < 2 and InequalityName(i, surface, (ENTRY, RATE)[order]) in loose
                 finding = positive(path, row, order, ends, bends, rises)
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
@@ -164,6 +164,12 @@ def inequalities(
             continue  # which side it goes on to is what the inequality inside says
         if not (found.name in loose or (touch and _is_of(touch.condition, found))):
             yield found
+
+
+def _before(segments: Segments, i: int, surface: str) -> InequalityName:
+    """Return the inequality at the joint that a segment starts at; of the image before half a turn."""
+    image = surface if i else dict(segments.images).get(surface, surface)
+    return InequalityName((i - 1) % segments.count, image, JOINT)
 
 
 def _enters_at_rest(chain: Chain, zeros: list[Vector], found: Inequality) -> bool:

@@ -247,7 +247,8 @@ def _shown(
         value = range_over(path, rows, level, index)
         if (row * path.middle(level, index))[0, 0] < 0 and path.lasts(level, index):
             return False
-        at_start, at_end = index == 0 and start_order > 0, index == 2**level - 1 and end_order > 0
+        at_start = index == 0 and (start_order > 0 or rises)
+        at_end = index == 2**level - 1 and end_order > 0
         if value > 0:
             return True
         if at_start and range_over(path, first, level, index) > 0:

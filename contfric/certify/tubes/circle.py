@@ -7,6 +7,9 @@ Anal. 34 (1997) 1-21). Of two real ones the product may be 1, too (a neutral sad
 discriminant tells these apart. A map of one dimension has no pair: that of every orbit of two states that
 sticks.
 
+Where an exit is met without speed (a grazing impact) one of two multipliers has no bound, and the product of
+both has one. There the characteristic polynomial of the chain is used, multiplied by that speed as it is.
+
 For a symmetric orbit P is that of half a turn. A pair ``+-i`` there is a double multiplier -1 of the whole
 one.
 """
@@ -58,11 +61,28 @@ def is_off(segments: Segments, build: Builder, closing: Closing, x: Vector) -> b
         return True
     if segments.turn != 0.0:
         found = monodromy(chain, joints)
+        if found is None and segments.states == 2 and not segments.kept:
+            return has_real_pair(chain, x[:-1])
         if found is not None and segments.kept:
             found = restricted(found, [one.row for one in segments.kept])
     else:  # where a multiplier 1 belongs to each orbit, which the Poincare map does not have
         found = poincare_map(chain, joints, known)
     return found is not None and no_pair(found)
+
+
+def has_real_pair(chain: Chain, z: Vector) -> bool:
+    """Tell whether a chain of two states has two real multipliers, or a product of them that is not 1.
+
+    They are the roots of ``a mu^2 + b mu + c``, times mu the determinant of the Jacobian with mu times the
+    closure: the last joint is on an exit surface, which takes one of three factors mu away.
+    """
+    plus, minus = (arb_mat(chain.linearised(z, sigma)[1]) for sigma in (1, -1))
+    own, closing = (plus + minus) / 2, (plus - minus) / 2
+    values = [plus.det(), minus.det(), (own + closing * 2).det()]
+    b, outer = (values[0] + values[1]) / 2, (values[0] - values[1]) / 2
+    a = (values[2] / 2 - 2 * b - outer) / 3
+    c = outer - a
+    return not (a - c).contains(0) or bool(b * b - 4 * a * c > 0)
 
 
 def no_pair(matrix: arb_mat) -> bool:

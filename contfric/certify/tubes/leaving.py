@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from flint import arb
+from flint import arb, arb_mat
 
 from contfric.bvp.system import System
 from contfric.certify.equations.chain import Chain, Segments
@@ -30,6 +30,7 @@ from contfric.certify.equations.extended import Builder, EventCondition, rows_of
 from contfric.certify.equations.zeros import Closing
 from contfric.certify.inequalities.along_segments import (
     DURATION,
+    ENTRY,
     EXIT,
     INSIDE,
     JOINT,
@@ -57,7 +58,7 @@ _BEYOND = 0.1
 #: Where in the box of a PD or BP its tube begins, as a share of its reach.
 WITHIN = 0.8
 #: Inequalities at joints, which may change their sign in the box of an end.
-_NUMBERS = (DURATION, JOINT, EXIT)
+_NUMBERS = (DURATION, JOINT, EXIT, ENTRY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,9 +173,9 @@ def _edge(tracer: Tracer, first: Vector, last: Vector, arcs: Arcs, forward: bool
             return None
     elif not names:
         return None
-    tangential = any(name.what == EXIT and tracer.is_tangential(name.segment) for name in names)
+    singular = any(tracer.is_singular(name) for name in names)
     leaves = forward if names else None
-    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), leaves, tangential)
+    piece = tracer.piece(box, arcs, (first[-1], last[-1]), all_of([]), leaves, singular)
     if not piece.decided:
         return None
     return tracer.linked(replace(piece, ends=names), box)
@@ -296,12 +297,21 @@ def _falls(edge: Edge, box: Box, name: InequalityName, window: arb | None) -> bo
     else:
         if sign is None:
             return False
-        if name.what == RATE and edge.segments.resets[i]:
-            return False
-        order, at = int(name.what in (EXIT, RATE)), i + int(name.what != RATE)
+        starts, order = name.what in (RATE, ENTRY), int(name.what in (EXIT, RATE))
         rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
-        slope = sign * dot(chain.observed(z, at, *rows)[1], box.tangent)
+        if starts and edge.segments.resets[i]:
+            rows = _before_reset(chain, edge.segments.resets[i], *rows)
+        slope = sign * dot(chain.observed(z, i + int(not starts), *rows)[1], box.tangent)
     return bool(slope < 0 if edge.forward else slope > 0)
+
+
+def _before_reset(
+    chain: Chain, reset: str, row: arb_mat, slope: arb_mat
+) -> tuple[arb_mat, arb_mat]:
+    """Return the row that an observable after a reset is before it, and its slope by the parameter."""
+    model = chain.model
+    assert model.slopes is not None
+    return row * model.resets[reset], slope * model.resets[reset] + row * model.slopes.resets[reset]
 
 
 def signs_of(system: System, name: InequalityName) -> int | None:
@@ -310,8 +320,9 @@ def signs_of(system: System, name: InequalityName) -> int | None:
     i = name.segment
     if name.what == EXIT:
         return int(layout.exit_signs[i])
-    if name.what == JOINT:
-        rows = [(at, surfaces[k], s) for at, k, s, where in layout.joint if where == 0]
+    if name.what in (JOINT, ENTRY):
+        after = int(name.what == ENTRY)
+        rows = [(at, surfaces[k], s) for at, k, s, where in layout.joint if where == after]
     else:
         rows = [(at, surfaces[k], s) for at, k, s in layout.interior]
         if layout.pins[i] == -1 and layout.exit_signs[i]:

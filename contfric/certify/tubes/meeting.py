@@ -212,7 +212,8 @@ def _leads(
     """Tell whether the orbit obeys the equations of segment i of the branch."""
     j, later = start
     following = ((j + 1) % len(cycle.joints), later + (j + 1) // len(cycle.joints))
-    own = (cycle.modes[j], cycle.resets[j]) == (segments.modes[i], segments.resets[i])
+    resets = cycle.resets[j], segments.resets[i]
+    own = cycle.modes[j] == segments.modes[i] and _act_alike(model, resets, cycle.vanishing[j])
     if not ((start == end and not segments.resets[i]) or (end == following and own)):
         return False
     pin = segments.pins[i]
@@ -221,3 +222,12 @@ def _leads(
     if isinstance(pin, str):
         return in_span(model.rows[pin], cycle.vanishing[j])
     return in_span(model.rate(pin[1], pin[0]), cycle.vanishing[j])
+
+
+def _act_alike(model: BallModel, resets: tuple[str, str], vanishing: list[Vector]) -> bool:
+    """Tell whether two resets (or none) lead to the same state, as an impact without speed leads nowhere."""
+    if resets[0] == resets[1]:
+        return True
+    one = arb_mat([[int(a == b) for b in range(model.size)] for a in range(model.size)])
+    first, second = (model.resets[name] if name else one for name in resets)
+    return all(in_span(row, vanishing) for row in (first - second).tolist())

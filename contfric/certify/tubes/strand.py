@@ -24,6 +24,7 @@ from contfric.certify.equations.extended import Builder
 from contfric.certify.equations.kept import with_kept
 from contfric.certify.equations.zeros import in_span
 from contfric.certify.events import EventCertificate
+from contfric.certify.inequalities.along_segments import DURATION, EXIT, InequalityName
 from contfric.certify.tubes.meeting import as_zero_of
 from contfric.continuation.branch import Branch
 from contfric.events.bifurcation import TERMINAL, EndReason
@@ -133,26 +134,33 @@ class Strand:
             found[k] = [*joints, value]
         return found
 
-    def is_tangential(self, i: int) -> bool:
-        """Tell whether the chain is singular where the exit of a segment is tangential, by its equations.
+    def is_singular(self, name: InequalityName) -> bool:
+        """Tell whether the chain is singular where an inequality ends, by its equations.
 
-        It is where the next mode moves on as this one: then the time of the exit has no part in any
-        equation. The difference of the two fields is to be a combination of the observable and its rate,
-        which vanish there. Where all matrices are affine in the parameter the minors that say so are of
-        degree four at most: they vanish if they do at five values.
+        It is where an exit is tangential and the next mode moves on as this one: then the time of the exit
+        has no part in any equation. And where a hold after a touch has no duration and is left without
+        acceleration: then the time of its end has none. The difference of the fields of the two modes is to
+        be a combination of the observable and its rate, which vanish there. Where all matrices are affine
+        in the parameter the minors that say so are of degree four at most: they vanish if they do at five
+        values.
         """
-        modes = [mode for mode, _ in self.orbit.itinerary]
-        mode, after, exit_ = modes[i], modes[(i + 1) % len(modes)], self.segments.exits[i]
+        modes, i = [mode for mode, _ in self.orbit.itinerary], name.segment
+        mode, after, pin = modes[i], modes[(i + 1) % len(modes)], self.segments.pins[i]
+        held = isinstance(pin, tuple)
+        if name.what != (DURATION if held else EXIT):
+            return False
+        along, met = pin if isinstance(pin, tuple) else (mode, self.segments.exits[i])
         low, high = float(self.branch.values.min()), float(self.branch.values.max())
         slopes = self._model(arb(low).union(arb(high))).slopes
-        if slopes is None or not exit_ or any(self.segments.resets) or not low < high:
+        if slopes is None or not met or any(self.segments.resets) or not low < high:
             return False
-        matrices = (slopes.fields[mode], slopes.fields[after], slopes.surfaces[exit_])
+        fields = (slopes.fields[own] for own in {mode, after, along})
+        matrices = (*fields, slopes.surfaces[met])
         if not all(x.is_exact() for matrix in matrices for x in matrix.entries()):
             return False
         for value in np.linspace(low, high, 5):
             model = self._model(arb(float(value)))
-            known = [model.rows[exit_], model.rate(exit_, mode)]
+            known = [model.rows[met], model.rate(met, along)]
             change = (model.fields[mode] - model.fields[after]).tolist()
             if not all(in_span(row, known) for row in change[: model.states]):
                 return False

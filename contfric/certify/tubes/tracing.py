@@ -44,8 +44,8 @@ _WAYS = (0.5, 0.25, 0.125)
 _PARTS = 16
 #: Most boxes that are tried along a branch: some minutes of work.
 _MOST = 30_000
-#: After so many shortest stretches in a row without a box no others are halved, until a box is proved: where
-#: the equations are singular all along (a continuum) halving is of no use.
+#: After so many shortest stretches in a row without a proof no others are halved, until one is proved: where
+#: the equations are singular all along (a continuum, a period without bound) halving is of no use.
 _IN_ROW = 8
 
 Arcs = tuple[float, float]
@@ -282,7 +282,7 @@ class Tracer(Strand):
         self.proved_length = length if whole else self.proved_length
         self.length = max(self.length, length) if whole else math.inf
         self.steady = self.steady + 1 if whole else _STEADY
-        self.missed = 0 if box is not None else self.missed + 1
+        self.missed = self.missed + 1 if admissible.verdict is Verdict.UNDECIDED else 0
         if box is None or piece is None:
             return [self._nothing(arcs, first, last)]
         return [self.linked(piece, box)]
@@ -294,24 +294,24 @@ class Tracer(Strand):
         values: tuple[arb, arb],
         admissible: Finding,
         leaves: bool | None = None,
-        tangential: bool = False,
+        singular: bool = False,
     ) -> Piece:
         """Return what is proved of a box, but for its link.
 
         Parameters
         ----------
         leaves : whether the branch ends in it on the way to its last point; to its first one if False
-        tangential : whether it ends at a tangential stop, at which the chain is singular
+        singular : whether the chain is singular where it ends, as at a tangential stop
         """
         events = [(label, zero, ends) for label, zero, ends in self.met if box.holds(zero)]
         inside = tuple(label for label, _, _ in events)
         points: list[Vector | None] = [None, None]
         if leaves is not None:
             points[leaves] = next((zero for _, zero, ends in events if ends), None)
-        folds = 0 if box.monotone else self._count(box, 1, points, tangential)
+        folds = 0 if box.monotone else self._count(box, 1, points, singular)
         # orbits with holds have no multipliers: the least disturbance ends a hold
         held = bool(self.system.holds)
-        flips = 0 if held or box.no_flip else self._count(box, -1, points, tangential)
+        flips = 0 if held or box.no_flip else self._count(box, -1, points, singular)
         ends = (float(values[0].mid()), float(values[1].mid()))
         off = held or has_no_pair(self.segments, self.plain, self.closes, box)
         tori = 0 if off else UNKNOWN
@@ -319,20 +319,20 @@ class Tracer(Strand):
         return Piece(*arcs, ends, True, admissible, folds, flips, tori, events=inside, knots=knots)
 
     def _count(
-        self, box: Box, sigma: int, points: list[Vector | None], tangential: bool = False
+        self, box: Box, sigma: int, points: list[Vector | None], singular: bool = False
     ) -> int:
         """Return how often the Jacobian with sigma times the closure is singular between the ends of a box.
 
         Parameters
         ----------
         points : solutions on its curve in the place of its ends, where the branch ends at one
-        tangential : whether that one is the place where it is singular
+        singular : whether that one is the place where it is singular
         """
         if not passes_once(self.segments, self.build, box, sigma):
             return UNKNOWN
         signs = []
         for last, known in enumerate(points):
-            if known and tangential:
+            if known and singular:
                 continue
             at = known or section(self.segments, self.plain, box, bool(last))
             if at is None:
