@@ -14,13 +14,13 @@ from contfric.continuation.locating import change_of_sign
 
 #: Rounding of a margin at a located event, several units in the last place of numbers of order 1.
 ROUNDING = 1e-13
-#: Branches with events of every kind that the oscillator has.
+#: Branches with folds, tangencies, and sliding events at their ends.
 STARTS = [
     ({"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
     ({"Omega": 0.48, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
     ({"Omega": 0.5, "S": 0.32, "S0": 0.4, "h": 0.2, "zeta": 0.05}, "Omega", (0.3, 0.8)),
-    ({"Omega": 0.5, "S": 0.06, "S0": 0.4}, "S", (0.03, 0.4)),
-    ({"Omega": 0.85, "S": 0.2, "S0": 0.25}, "S", (0.05, 0.25)),
+    ({"Omega": 0.415, "S": 0.098, "S0": 0.2}, "Omega", (0.3, 0.55)),
+    ({"Omega": 0.56, "S": 0.315, "S0": 0.476}, "Omega", (0.4, 0.7)),
 ]
 
 
