@@ -301,19 +301,27 @@ def back_substitute(workspace, close, close_w, d):  # type: ignore[no-untyped-de
             after[i, k] = value
     for i in range(count - 1, 0, -1):
         for j in range(m - 1, -1, -1):
-            for k in range(right):
-                value = kept[i, j, 3 * m + free + k]
+            for k in range(0, right, 2):  # two columns for each number that is loaded
+                other = min(k + 1, right - 1)
+                first, second = kept[i, j, 3 * m + free + k], kept[i, j, 3 * m + free + other]
                 for n in range(m):
-                    value -= kept[i, j, n] * z[0, n, k] + kept[i, j, 2 * m + n] * after[n, k]
+                    one, two = kept[i, j, n], kept[i, j, 2 * m + n]
+                    first -= one * z[0, n, k] + two * after[n, k]
+                    second -= one * z[0, n, other] + two * after[n, other]
                 for n in range(free):
-                    value -= kept[i, j, 3 * m + n] * w[n, k]
+                    one = kept[i, j, 3 * m + n]
+                    first, second = first - one * w[n, k], second - one * w[n, other]
                 for n in range(j + 1, m):
-                    value -= kept[i, j, m + n] * z[i, n, k]
+                    one = kept[i, j, m + n]
+                    first, second = first - one * z[i, n, k], second - one * z[i, n, other]
                 if exchanged and shares[i, j] != 0.0:
                     for later in range(i + 2, count):
                         for n in range(m):
-                            value -= shares[i, j] * d[0, later, n] * z[later, n, k]
-                z[i, j, k] = value / kept[i, j, m + j]
+                            one = shares[i, j] * d[0, later, n]
+                            first -= one * z[later, n, k]
+                            second -= one * z[later, n, other]
+                pivot = kept[i, j, m + j]
+                z[i, j, k], z[i, j, other] = first / pivot, second / pivot
         for j in range(m):
             for k in range(right):
                 after[j, k] = z[i, j, k]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from contfric.bvp.system import EventFunction
 from contfric.continuation.accuracy.rounding import Estimate
 from contfric.continuation.points import Point, Settings
@@ -67,4 +65,4 @@ def _is_rough(kind: Kind, here: Orbit, tests: tuple[EventFunction, ...]) -> bool
 def _stable(point: Point, here: Orbit, settings: Settings) -> bool | None:
     if here.system.holds:
         return False
-    return bool((np.abs(point.mu) < 1.0).all()) if settings.stability else None
+    return all(abs(mu) < 1.0 for mu in point.mu.tolist()) if settings.stability else None

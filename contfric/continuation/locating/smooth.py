@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -67,7 +66,7 @@ def smooth_events(step: Step) -> list[Located]:
     size = min(1.0, orbit.model.size_of(step.active, before.value))
     # events after a sliding one do not happen
     slides = step.beyond is not step.after
-    step = replace(step, after=last_told(step) or step.after)
+    step = altered(step, after=last_told(step) or step.after)
     told = first_told(step)
     values = zip(
         [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()],
@@ -81,7 +80,7 @@ def smooth_events(step: Step) -> list[Located]:
             continue  # chi(1) of a fold vanishes with it
         if max(abs(a), abs(b)) < LEVEL * (size if column == FOLD else 1.0):
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
-        if column != FOLD and _is_rounding(replace(step, before=told), base + column):
+        if column != FOLD and _is_rounding(altered(step, before=told), base + column):
             continue
         share = a / (a - b) if np.isfinite(a) else 0.5  # infinite at a grazing: nothing is known
         may_cross = column == CHI_ONE and orbit.model.symmetry is None
@@ -112,7 +111,7 @@ def smooth_events(step: Step) -> list[Located]:
             found.append(_overshot(step, kind))
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
-    return [*found, *tangencies(replace(step, after=step.beyond))]
+    return [*found, *tangencies(altered(step, after=step.beyond))]
 
 
 def _is_sliding(step: Step, fold: Bifurcation) -> bool:
@@ -287,8 +286,8 @@ def _undone(step: Step, others: list[Located]) -> list[Located]:
             same = (before.labels == after.labels) & (nearby.labels != before.labels)
             for k in np.flatnonzero(same).tolist():
                 changes = [
-                    *_changes(replace(step, after=nearby, beyond=nearby), k),
-                    *_changes(replace(step, before=nearby), k),
+                    *_changes(altered(step, after=nearby, beyond=nearby), k),
+                    *_changes(altered(step, before=nearby), k),
                 ]
                 found += [c for c in changes if all(_apart(c, o) for o in (*others, *found))]
     return found
@@ -305,7 +304,7 @@ def _vanishes(step: Step, k: int) -> bool:
     i, n = int(system.layout.labels[k][0]), system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
     motions = map(step.orbit_at, (step.before, step.after))
-    return any(np.any((m.ends - m.cycle)[near, 0] < NO_LENGTH) for m in motions)
+    return any(np.any(m.durations[near] < NO_LENGTH) for m in motions)
 
 
 def _meets(orbit: Orbit, k: int, here: Orbit) -> bool:
