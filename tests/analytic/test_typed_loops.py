@@ -112,7 +112,7 @@ def test_what_vanishes_is_named_alike_by_all_its_margins(tmp_path: Path) -> None
     of their end (AS). Margins said CS, SS, or the other of the two; at w = 0.412576935572 so did the diagram.
     """
     model, rng, named = typed(tmp_path, LIMITED), np.random.default_rng(5), Counter[cf.Kind]()
-    drawn = [(0.41, {}), *((0.4, own) for own in _some_limits(rng, 6))]
+    drawn = [(0.41, {}), *((0.4, own) for own in _some_limits(rng, 3))]
     for w, own in drawn:
         orbit = cf.find_orbit(model, params={"w": w, **own})
         branches = cf.explore(orbit, "w", (0.35, 0.6), max_branches=8).branches

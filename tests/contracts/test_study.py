@@ -356,8 +356,14 @@ def test_quantities_that_are_not_wanted_are_not_computed(tmp_path, write, monkey
         cf.run_study(write(HEAD + CONTINUE + "want: [asymmetry]\n"), tmp_path / "other")
 
 
-@pytest.mark.parametrize("want", ["[]", "[stops]", "[extrema]"])
-@pytest.mark.parametrize("rows", ["", ", rows: [x_max]", ", rows: [psi, stops, x_min, energy]"])
+@pytest.mark.parametrize(
+    ("want", "rows"),
+    [
+        *(("[]", rows) for rows in ("", ", rows: [x_max]", ", rows: [psi, stops, x_min, energy]")),
+        ("[stops]", ", rows: [x_max]"),
+        ("[extrema]", ""),
+    ],
+)
 def test_rows_need_no_columns(tmp_path, write, want, rows) -> None:
     """A figure shows its rows, whatever columns are wanted; without rows it has one all the same."""
     text = HEAD + EXPLORE + f"want: {want}\nfigures: [{{kind: diagram{rows}}}]\n"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -351,12 +352,18 @@ def apart(one: cf.Orbit, other: cf.Orbit) -> float:
     )
 
 
+def crossings(case: int | str) -> list[Any]:
+    return [n for n in diagram(case).nodes if n.bifurcation.kind is cf.Kind.CS and not n.mirrored]
+
+
+def test_some_scenes_have_crossings() -> None:
+    assert sum(bool(crossings(case)) for case in (*CHOSEN, *SEEDS[:7])) >= 3
+
+
 @each_case
 def test_at_cs_both_itineraries_have_the_same_orbit(case: int | str) -> None:
     found = diagram(case)
-    for node in found.nodes:
-        if node.bifurcation.kind is not cf.Kind.CS or node.mirrored:
-            continue
+    for node in crossings(case):
         tips = [
             found.branches[i][-k]
             for i in node.branches

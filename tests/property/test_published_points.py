@@ -156,15 +156,28 @@ def is_tangential(orbit: cf.Orbit) -> bool:
     )
 
 
+def smooth_events(case: int | str) -> list[cf.Bifurcation]:
+    """Return the located events at which a multiplier reaches the unit circle and nothing is held."""
+    return [
+        event
+        for branch in branches(case)
+        for event in branch.bifurcations
+        if event.kind in (cf.Kind.SN, cf.Kind.BP, cf.Kind.PD)
+        and event.located
+        and not event.orbit.system.holds
+    ]
+
+
 @each_case
 def test_smooth_events_have_their_multiplier(case: int | str) -> None:
-    for branch in branches(case):
-        for event in branch.bifurcations:
-            smooth = event.kind in (cf.Kind.SN, cf.Kind.BP, cf.Kind.PD)
-            if not smooth or not event.located or event.orbit.system.holds:
-                continue
-            size = 1.0 + float(np.max(np.abs(event.orbit.turn_multipliers)))
-            assert abs(off_circle(event.kind, event.orbit)) < ON_CIRCLE * size, event
+    for event in smooth_events(case):
+        size = 1.0 + float(np.max(np.abs(event.orbit.turn_multipliers)))
+        assert abs(off_circle(event.kind, event.orbit)) < ON_CIRCLE * size, event
+
+
+def test_some_scenes_have_smooth_events() -> None:
+    found = [len(smooth_events(case)) for case in (*CHOSEN, *range(SCENES))]
+    assert np.count_nonzero(found) >= 5 and sum(found) >= 15
 
 
 @each_case

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import networkx as nx
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contfric.errors import NotationError
@@ -44,6 +44,7 @@ def walks(draw: st.DrawFn) -> Signature:
 letters = st.lists(st.integers(0, 2), min_size=1, max_size=14).map(tuple)
 
 
+@settings(max_examples=40)
 @given(letters, st.integers(-20, 20))
 def test_least_rotation_is_the_least(items: tuple[int, ...], k: int) -> None:
     every = [rotated(items, i) for i in range(len(items))]

@@ -90,8 +90,8 @@ def compared(seed: int, passed: bool) -> int:
 
 
 def test_solutions_are_those_of_small_steps() -> None:
-    assert sum(compared(seed, passed=True) for seed in range(8)) >= 20
+    assert sum(compared(seed, passed=True) for seed in range(4)) >= 10
 
 
 def test_what_no_mode_follows_ends() -> None:
-    assert sum(compared(seed, passed=False) for seed in range(8)) >= 12
+    assert sum(compared(seed, passed=False) for seed in range(4)) >= 6

@@ -17,6 +17,9 @@ from contfric.models.view import FlowView
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
 _STEPS = 30
+#: Of 17,700 starts that came to a surface none took more than 4 steps that led farther away from it; of those
+#: that came to none all took 7 or more.
+_FARTHER = 6
 #: A step of no more than this share of a number is lost in its rounding.
 _STILL = 2.0**-53
 #: On a surface: rounding of an observable of size 1.
@@ -166,13 +169,15 @@ class Probe:
         self, surfaces: tuple[str, ...], t: float, y: FloatArray
     ) -> tuple[float, FloatArray] | None:
         """Return a time and state on some surfaces near others; the time moves only if it must."""
-        point = np.array([t, *y])
+        point, last, farther = np.array([t, *y]), math.inf, 0
         for _ in range(_STEPS):
             above = np.array([self.height(s, point[0], point[1:]) for s in surfaces])
-            if np.all(np.abs(above) <= ON):
+            distance = float(np.abs(above).max(initial=0.0))
+            if distance <= ON:
                 return float(point[0]), point[1:]
+            farther, last = farther + (not distance < last), distance
             slopes = np.array([self.slope(s, point[0], point[1:]) for s in surfaces])
-            if not (np.all(np.isfinite(slopes)) and np.all(np.isfinite(above))):
+            if farther > _FARTHER or not (math.isfinite(distance) and np.isfinite(slopes).all()):
                 return None
             step, rank = _shortest(slopes[:, 1:], above)
             step = np.array([0.0, *step])
