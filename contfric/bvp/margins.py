@@ -38,7 +38,7 @@ def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tupl
     next begins: where it shrinks to nothing, the acceleration with which the first is left has one.
     """
     found: list[tuple[int, str]] = []
-    left = {(hold.segment + 1) % len(itinerary) for hold in holds}
+    left = _slides(itinerary, holds)
     for hold in holds:
         before = (hold.segment - 1) % len(itinerary)
         if hold.after_rest:
@@ -46,6 +46,12 @@ def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tupl
         elif hold.pin is None and before in left:
             found.append((before, itinerary[before][1]))
     return found
+
+
+def _slides(itinerary: Itinerary, holds: tuple[Hold, ...]) -> dict[int, Hold]:
+    """Return the slides from a hold to where the same contact comes to rest, each with that hold."""
+    found = {(hold.segment + 1) % len(itinerary): hold for hold in holds}
+    return {i: hold for i, hold in found.items() if itinerary[i][1] == hold.leaves}
 
 
 def double_zeros(
@@ -57,7 +63,7 @@ def double_zeros(
     acceleration with which a hold is left into a slide up to the touch of the next one.
     """
     pairs: list[tuple[EventFunction, int]] = []
-    left = {(hold.segment + 1) % len(itinerary) for hold in holds}
+    left = _slides(itinerary, holds)
     for hold in holds:
         before = (hold.segment - 1) % len(itinerary)
         if hold.after_rest:
@@ -70,6 +76,7 @@ def double_zeros(
                 (EventFunction(Margin.JOINT, (before - 1) % len(itinerary), surface), before)
             )
         elif hold.pin is None and before in left:
-            stopped = next(h for h in holds if (h.segment + 1) % len(itinerary) == before)
-            pairs.append((EventFunction(Margin.EXIT, stopped.segment, stopped.leaves), before))
+            pairs.append(
+                (EventFunction(Margin.EXIT, left[before].segment, left[before].leaves), before)
+            )
     return pairs

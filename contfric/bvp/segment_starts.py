@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from contfric.bvp.holds import Hold
 from contfric.models.definition import Model
 from contfric.models.mode_domains import mirror_mode, mode_domains
-from contfric.signature.holds import is_hold, mirror_exit
+from contfric.signature.holds import is_hold, left_surface, mirror_exit
 
 Itinerary = tuple[tuple[str, str], ...]
 
@@ -55,10 +55,10 @@ def beginnings(
 
 def _returns(model: Model, mode: str, before: str, exit_: str, entered: str) -> int:
     """Tell whether a segment begins on the surface that it ends on: it came there, or rested on it."""
+    if is_hold(entered):  # it may end as another contact changes
+        return int(exit_ == left_surface(model, before, mode))
     if model.mode_by_name[mode].sliding:
         return 0
-    if is_hold(entered):
-        return 1
     rest = model.rests_on(exit_)
     reset = model.reset_at(before, entered)
     if rest and not model.filippov:  # rest is left, and a stop reversed, with an acceleration

@@ -40,7 +40,7 @@ from contfric.events.local.zero_acceleration import only_comes_back, touch_of
 from contfric.models.definition import Model
 from contfric.models.growing_model import ComposedModel
 from contfric.orbit.orbit import Orbit
-from contfric.signature.edits import Edit, split, swap_edit
+from contfric.signature.edits import Edit, entered, split, swap_edit
 from contfric.signature.holds import is_hold
 
 if TYPE_CHECKING:
@@ -79,22 +79,55 @@ def continuous_edit(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints
 def _two_at_once(orbit: Orbit, i: int, surface: str) -> tuple[Edit, Joints, Speeds, str]:
     """Return the edit where two surfaces are met at once: of one contact, or of two."""
     model, itinerary = orbit.model, orbit.itinerary
-    (mode, first), (_, second) = itinerary[i], itinerary[(i + 1) % len(itinerary)]
+    mode = itinerary[i][0]
     joints: Joints = {(i, 0): orbit.ends[i]}
     if isinstance(model, ComposedModel) and model.composition.structure.coupled:
         return _sharing(orbit, model, i, surface)
     if not any(through == surface for through, _ in model.exits_of(mode)):
         edit = swap_edit(itinerary, {i: surface}, model)
         return edit, joints, {}, f"swap stick and reversal at stop {i + 1}, at {surface}"
-    after = itinerary[(i + 2) % len(itinerary)][0]
-    others = [m for through, m in model.exits_of(mode) if through == surface]
-    ways = [m for m in others if after in model.targets.get((m, first), ())]
-    if second != surface or not ways or _lasts(orbit, (i + 1) % len(itinerary)):
+    edit, reason = exchanged(orbit, i, surface)
+    return edit, joints, {}, reason
+
+
+def exchanged(orbit: Orbit, i: int, surface: str) -> tuple[Edit, str]:
+    """Return the edit where two contacts that do not share loads change in the other order, and why.
+
+    One changes at the end of segment i, the other one at ``surface``, which is met at once.
+
+    Raises
+    ------
+    NotationError
+        If it is no such place.
+    """
+    model, itinerary = orbit.model, orbit.itinerary
+    j = (i + 1) % len(itinerary)
+    (mode, first), (_, second), (after, _) = (
+        itinerary[k % len(itinerary)] for k in (i, i + 1, i + 2)
+    )
+    domains = [domain.name for domain in model.domains_of(model.whole_mode(mode))]
+    ways = [
+        other
+        for other in modes_through(model, mode, surface)
+        if entered(entered(domains, surface, model, mode, other), first, model, other, after)
+    ]
+    if second != surface or not ways or _lasts(orbit, j):
         raise NotationError(
             f"{surface} and {first} are met at once, and do not change places there"
         )
-    edit = Edit(frozenset({(i + 1) % len(itinerary)}), {i: surface}, {i: ((ways[0], first),)})
-    return edit, joints, {}, f"{surface} is met before {first} at the end of segment {i + 1}"
+    edit = Edit(frozenset({j}), {i: surface}, {i: ((ways[0], first),)})
+    return edit, f"{surface} is met before {first} at the end of segment {i + 1}"
+
+
+def modes_through(model: Model, mode: str, surface: str) -> list[str]:
+    """Return the other modes that a mode is left to through a surface, in their order."""
+    own = model.whole_mode(mode)
+    found = {
+        model.domain_by_name[target].mode
+        for domain in model.domains_of(own)
+        for target in model.targets.get((domain.name, surface), ())
+    }
+    return sorted(found - {own}, key=model.mode_order)
 
 
 def _sharing(

@@ -7,6 +7,7 @@ The solution at the event is known, so the local structure of each outcome can b
 event, at the location                 outcome
 =====================================  ========================================================
 CS, the state at a stop meets F        swap stick and reversal (a stick of length zero)
+CS, two contacts change at once        they change in the other order
 SS, followed by a reversal             insert a hold of length zero, pinned to F
 SS, followed by a stick                the stick becomes a hold pinned to F
 GS, an impact is grazed inside         split it there: an impact of speed zero
@@ -58,7 +59,7 @@ from contfric.events.local.zero_acceleration import (
     touches_again,
 )
 from contfric.events.outcomes import standing_slides as slides
-from contfric.events.outcomes.contact_outcomes import continuous_edit
+from contfric.events.outcomes.contact_outcomes import continuous_edit, exchanged, modes_through
 from contfric.events.outcomes.grazing_impacts import grazing_impact, impact_at_joint
 from contfric.models.definition import Model
 from contfric.orbit.canonical.slides import time_unit
@@ -135,12 +136,7 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Successor(edit, joints, reason, away)
     if kind is Kind.CS:
-        i, surface = location.segment, location.surface
-        edit, joints = (
-            swap_edit(orbit.itinerary, {i: surface}, orbit.model),
-            {(i, 0): orbit.ends[i]},
-        )
-        return Successor(edit, joints, f"swap stick and reversal at stop {i + 1}, at {surface}")
+        return _two_at_once(orbit, location.segment, location.surface)
     if kind is Kind.SS:
         return _stop_on_surface(orbit, location)
     if orbit.model.reset_at(mode, location.surface) is not None:
@@ -153,6 +149,16 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
     if rests:
         return _released_tangentially(orbit, location) if ends else _limit_touched(orbit, location)
     return _stops_tangentially(orbit, location) if ends else _rest_touched(orbit, location)
+
+
+def _two_at_once(orbit: Orbit, i: int, surface: str) -> Successor:
+    """CS: a surface is met where a segment ends, by the contact that stops there or by another one."""
+    if modes_through(orbit.model, orbit.itinerary[i][0], surface):
+        edit, reason = exchanged(orbit, i, surface)
+    else:
+        edit = swap_edit(orbit.itinerary, {i: surface}, orbit.model)
+        reason = f"swap stick and reversal at stop {i + 1}, at {surface}"
+    return Successor(edit, {(i, 0): orbit.ends[i]}, reason)
 
 
 def _stop_on_surface(orbit: Orbit, location: EventFunction) -> Successor:
