@@ -17,15 +17,13 @@ Without excitation the last joint fixes the phase, and what is passed is a plane
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import islice
 
 import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.passages import Passage, fields_between, passage_at
-from contfric.bvp.system import Itinerary, System, following_modes
-from contfric.models.definition import Model
+from contfric.bvp.system import System, following_modes
 from contfric.models.view import FlowView
 from contfric.signature.holds import is_hold
 
@@ -47,16 +45,18 @@ def pass_when_due(
     a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
     """
     model, itinerary = system.model, system.itinerary
-    due = _due(model, itinerary, system.half)
-    if not due:
-        return
     view = FlowView(model, vector)
-    for i, passage, following in due:
-        mode, exit_ = itinerary[i]
+    after = following_modes(model, itinerary, system.half)
+    for i, ((mode, exit_), following) in enumerate(zip(itinerary, after, strict=True)):
+        if is_hold(exit_) or is_hold(itinerary[(i + 1) % len(itinerary)][1]):
+            continue  # what is held has equations of its own
         last = i + 1 == len(itinerary)
         end = _end(system, joints, view, i)
         slope = view.gradient(model.surface_by_name[exit_].observable, *end)
         if not _is_small(slope, b[i, :-1, 0]):
+            continue
+        passage = passage_at(model, mode, exit_, following)  # of few joints, as it takes a while
+        if passage is Passage.JUMP:
             continue
         if passage is Passage.PROJECTED:
             project = _projection(view, slope[1:], (mode, exit_, following))
@@ -69,21 +69,6 @@ def pass_when_due(
             b[i, -1, 1:] = field / (np.linalg.norm(field) or 1.0)
         else:
             a[i, -1, 0], b[i, -1, 0] = -1.0, 1.0
-
-
-@cache
-def _due(model: Model, itinerary: Itinerary, half: bool) -> list[tuple[int, Passage, str]]:
-    """Return the joints at which the rate may vanish, with what the field does there and what follows."""
-    after = following_modes(model, itinerary, half)
-    found: list[tuple[int, Passage, str]] = []
-    for i, ((mode, exit_), following) in enumerate(zip(itinerary, after, strict=True)):
-        passage = passage_at(model, mode, exit_, following)
-        held = is_hold(
-            itinerary[(i + 1) % len(itinerary)][1]
-        )  # what is held has equations of its own
-        if passage is not Passage.JUMP and not held:
-            found.append((i, passage, following))
-    return found
 
 
 def _end(system: System, joints: FloatArray, view: FlowView, i: int) -> tuple[float, FloatArray]:

@@ -287,13 +287,13 @@ def margin_sizes(orbit: Orbit) -> list[float]:
         places.append((float(orbit.begins[i, 0]) + later, state_within(orbit, i, later)))
 
     @cache
-    def values(observable: str) -> list[float]:
-        return [flow.observe(observable, t, y) for t, y in places]
+    def values(observable: str) -> FloatArray:
+        return np.array([flow.observe(observable, t, y) for t, y in places])
 
     @cache
     def size(surface: str) -> float:
-        level = flow.level(surface)
-        return max(abs(value - level) for value in values(surfaces[surface].observable)) or 1.0
+        heights = values(surfaces[surface].observable) - flow.level(surface)
+        return float(np.max(np.abs(heights))) or 1.0
 
     heights = (Margin.JOINT, Margin.INTERIOR)
     return [size(t.surface) if t.margin in heights else 1.0 for t in orbit.system.tests]

@@ -115,12 +115,14 @@ def _of_one_sign(columns: FloatArray) -> FloatArray:
     array([0., 0.])
     """
     none = np.zeros(len(columns))
-    if columns.shape[1] == 1:
-        column = columns[:, 0] if np.max(columns) >= -np.min(columns) else -columns[:, 0]
-        one_sign = np.max(column) > _ZERO and np.min(column) >= -_ZERO * np.max(column)
-        return np.maximum(column, 0.0) / np.sum(np.maximum(column, 0.0)) if one_sign else none
     if not columns.size or np.max(np.abs(columns)) <= _ZERO:
         return none
+    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    columns = left[:, sizes > _ZERO * sizes[0]]  # what is combined has as many directions
+    if columns.shape[1] == 1:
+        column = columns[:, 0] if np.max(columns) >= -np.min(columns) else -columns[:, 0]
+        one_sign = np.min(column) >= -_ZERO * np.max(column)
+        return np.maximum(column, 0.0) / np.sum(np.maximum(column, 0.0)) if one_sign else none
     linprog = whole("scipy.optimize").linprog
 
     found = linprog(
