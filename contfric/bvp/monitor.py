@@ -90,9 +90,8 @@ def interior_margin(functions, layout, k, found, z, p, workspace, stationary):  
         last = duration - _AT_PIN * (1.0 + duration)
     target = functions.level(layout.interior[k, 1], p, workspace.none, workspace.empty)
     least = least_distance(found, float(layout.interior[k, 2]), target, stationary, first, last)
-    # what it touched at its start it may touch at the same height again; the hold begins at the first
+    # what it touched at its start it may touch at the same height again
     least += equal_heights(layout, i, k, target, duration)
-    least -= equal_heights(layout, (i + 1) % count, k, target, duration)
     if layout.pins[i] == layout.interior[k, 1]:  # its load falls from the limit on which it starts
         c = layout.observables[layout.interior[k, 1]]
         none, empty = workspace.none, workspace.empty

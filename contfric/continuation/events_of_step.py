@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.base.attributes import altered
 from contfric.continuation.accuracy.near_sliding_events import SAME_FOLD, SAME_LOCATION, SAME_VALUE
 from contfric.continuation.accuracy.rounding import not_critical
 from contfric.continuation.ends.at_events import (
@@ -29,7 +28,6 @@ from contfric.continuation.moving_joints import (
 from contfric.continuation.points import EXTRA, Point, Settings
 from contfric.continuation.step import Step
 from contfric.events.bifurcation import TERMINAL, Bifurcation, End, EndReason, Kind
-from contfric.events.split_touch import splits
 from contfric.orbit.orbit import Orbit
 
 #: An event within this share of a step of a limit of the parameter belongs to the limit (S = 0).
@@ -182,14 +180,9 @@ def locate_events(
     A point that is ``lost`` is no event: Newton fails after it before any condition is violated.
     """
     sliding = sliding_events(orbit, before, after, settings)
-    turns = before.slope * after.slope < 0.0
-    if not sliding or (turns and splits(sliding[0][0].orbit)):
+    if not sliding:
         smooth = smooth_events(Step(orbit, before, after, after, settings))
-        if not sliding:
-            return sorted(smooth, key=lambda pair: pair[1].arc)
-        # a margin jumps where a touch splits, and Newton's method with it: the fold is known better
-        folds = [pair for pair in smooth if pair[0].kind is Kind.AS]
-        sliding = folds[:1] or [(b, altered(point, rough=True)) for b, point in sliding]
+        return sorted(smooth, key=lambda pair: pair[1].arc)
     end = sliding[0][1]
     if end.arc <= before.arc:  # it is at the first point: nothing comes before it
         return sliding

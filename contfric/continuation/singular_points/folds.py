@@ -87,8 +87,7 @@ def fold_at(step: Step, point: Point) -> list[Located]:
         return [crossing]
     split = as_split(vertex[0], point.tangent)
     if split is not None:
-        # normal to the tangent, along which times of touches move alone, the equations are singular
-        return [(altered(split, bound=ROUGH), point)]
+        return [(split, point)]
     if _is_jump(step, point) or _is_idle(step, point):
         return []
     if _is_vertical(step):
