@@ -12,7 +12,7 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.completeness import verification
-from contfric.atlas.completeness.degenerate import Degenerate, joined_surely
+from contfric.atlas.completeness.degenerate import Degenerate, degenerate_events, joined_surely
 from contfric.atlas.completeness.verification import _told_apart
 
 sys.path.insert(0, FOLDER := str(Path(__file__).parents[2] / "benchmarks" / "stress"))
@@ -114,6 +114,27 @@ def test_what_is_known_excuses_nothing_elsewhere(
         found = verification.verify(diagram, 3, known=known)
         assert not found.same and not found.explained
     assert verification.verify(diagram, 3, known=(at(diagram, lost),)).explained
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_an_event_that_is_not_located_excuses_nothing(diagram: cf.Diagram, seed: int) -> None:
+    """What rounding moves by more than any located event would be degenerate all over the range."""
+    rng = np.random.default_rng([5, seed])
+    unknown = float(10.0 ** rng.uniform(-1.0, 1.0))
+    k = int(rng.choice([i for i, b in enumerate(diagram.branches) if not b.mirrored]))
+    branch = diagram.branches[k]
+    changed = {id(b): replace(b, bound=unknown) for b in branch.bifurcations}
+    ends = tuple(
+        replace(end, bifurcation=changed.get(id(end.bifurcation), end.bifurcation))
+        for end in branch.ends
+    )
+    events = tuple(changed[id(b)] for b in branch.bifurcations)
+    lost = replace(branch, bifurcations=events, ends=ends)
+    branches = (*diagram.branches[:k], lost, *diagram.branches[k + 1 :])
+    before = {str(found) for found in degenerate_events(diagram)}
+    assert {
+        str(found) for found in degenerate_events(replace(diagram, branches=branches))
+    } <= before
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -28,6 +28,7 @@ from contfric.events.incident.unit import unit_of
 from contfric.events.local.touching import leads_elsewhere
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
+from contfric.orbit.slides import modulo
 from contfric.orbit.solve import refine
 from contfric.simulation.simulate import simulate
 
@@ -44,13 +45,13 @@ _SHARES = (0.381966, 0.618034)
 _APART = 1e-6
 #: Where rest is tried near an event, relative to the range: beyond the accuracy of the event.
 _REST_BESIDE = 1e-4
-#: Events of a trial of rest: a solution has some in each period.
-_EVENTS = 20
-#: Its length in periods: no whole number, so that what moves is elsewhere at its end.
-_TRIED = 2.3
+#: Events of a trial of rest, of which a solution has some in each period, and its length in periods: no whole
+#: number, so that what moves is elsewhere at its end.
+_EVENTS, _TRIED = 20, 2.3
 #: What changes by less is at rest: at the event slides are as long as the third root of rounding, and that
-#: far from it the shortest go ten times this far.
-_STILL = 1e-7
+#: far from it the shortest go ten times this far. And the share of a period that is no time: where nothing
+#: jumps slides go no farther than that just beyond the event, but last longer.
+_STILL, _NO_TIME = 1e-7, 1e-4
 
 
 @dataclass(frozen=True)
@@ -193,13 +194,13 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
         run = simulate(model, params, state=state, time=float(time), periods=_TRIED, events=_EVENTS)
     except ContfricError:  # no such state there, or a value outside of the limits
         return False
-    visited = np.array([*run.states, run.last[2]])  # where one mass rests others may move
-    still = bool(np.abs(visited - state).max() < _STILL)
+    still = bool(np.abs(np.array([*run.states, run.last[2]]) - state).max() < _STILL)
     modes = [mode for mode, _ in run.itinerary]
-    if still and run.last[3] and model.is_at_rest(run.last[3]):
-        return True  # whatever it was in for no time, as at a wall that just touches it
+    lasts = modulo(np.diff(run.times, prepend=time), orbit.period / orbit.periods)
+    stays = all(map(model.is_at_rest, np.compress(lasts >= _NO_TIME * orbit.period, modes)))
     sliding = all(model.mode_by_name[mode].sliding for mode in modes)
-    return sliding and (still or all(model.is_at_rest(mode) for mode in modes))
+    rests = bool(run.last[3]) and model.is_at_rest(run.last[3])
+    return (stays and rests) or (sliding and (still or all(map(model.is_at_rest, modes))))
 
 
 def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:

@@ -17,6 +17,7 @@ import numpy as np
 from contfric.atlas.matching import stops_distance
 from contfric.continuation.branch import Branch
 from contfric.continuation.families.continuum import is_continuum
+from contfric.continuation.locating.sliding import ROUGHLY_REACHED
 from contfric.events.bifurcation import Bifurcation, Kind
 
 if TYPE_CHECKING:
@@ -50,11 +51,12 @@ class Degenerate:
 def degenerate_events(diagram: Diagram) -> Iterator[Degenerate]:
     """Yield what is degenerate: two events in one location, alike or at both ends of a branch.
 
-    And two conditions at once.
+    And two conditions at once. An event that is not located is no excuse: it would be one everywhere.
     """
     parameter, width = diagram.parameter, diagram.width
     values = sorted(
-        (b for b in diagram.bifurcations if b.kind is not Kind.T), key=lambda b: b.params[parameter]
+        (b for b in diagram.bifurcations if b.kind is not Kind.T and _is_known(b)),
+        key=lambda b: b.params[parameter],
     )
 
     def located(text: str, *events: Bifurcation) -> Degenerate:
@@ -131,4 +133,10 @@ def unresolved(branch: Branch, width: float) -> bool:
         return False
     ends = [end.bifurcation for end in branch.ends if end.bifurcation is not None]
     known = sum(b.accuracy for b in ends) * width
-    return len(ends) == 2 and bool(np.ptp(branch.values) < known)
+    located = len(ends) == 2 and all(map(_is_known, ends))
+    return located and bool(np.ptp(branch.values) < known)
+
+
+def _is_known(event: Bifurcation) -> bool:
+    """Tell whether the location of an event is known at all."""
+    return event.accuracy <= ROUGHLY_REACHED
