@@ -49,8 +49,8 @@ of six holds turn: some are said to end there, and one half of another is counte
 **What is excused, and what is cut.** Before the run it was fixed which differences are not counted as
 failures: values at which Omega = 1/n and nothing is damped; two events of one solution that are
 nearer than their accuracies, both located; and smooth events at which a second condition fails
-(`contfric/atlas/completeness/degenerate.py`). They excuse what differs at them, or is joined to the start by them
-alone. Runs up to commit e57bef2b excuse all cases with S = S0, or with Omega = 1/n where zeta varies, too.
+(`contfric/atlas/completeness/degenerate.py`). They excuse what differs at them, or is joined to the start
+by them alone. Runs up to commit e57bef2b excuse all cases with S = S0, or with Omega = 1/n where zeta varies, too.
 Cases that take longer than a limit are cut (in runs that name no commit
 those with too many branches, too). The tables show how many there are.
 

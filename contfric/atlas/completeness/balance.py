@@ -26,9 +26,9 @@ from contfric.errors import ContfricError
 from contfric.events.bifurcation import Bifurcation, EndReason, Kind
 from contfric.events.incident.unit import unit_of
 from contfric.events.local.touching import leads_elsewhere
+from contfric.orbit.canonical.slides import modulo
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
-from contfric.orbit.slides import modulo
 from contfric.orbit.solve import refine
 from contfric.simulation.simulate import simulate
 
