@@ -50,8 +50,8 @@ of six holds turn: some are said to end there, and one half of another is counte
 failures: values at which Omega = 1/n and nothing is damped; two events of one solution that are
 nearer than their accuracies, both located; and smooth events at which a second condition fails
 (`contfric/atlas/completeness/degenerate.py`). They excuse what differs at them, or is joined to the start
-by them alone. Runs up to commit e57bef2b excuse all cases with S = S0, or with Omega = 1/n where zeta varies, too.
-Cases that take longer than a limit are cut (in runs that name no commit
+by them alone. Runs up to commit e57bef2b excuse all cases with S = S0, or with Omega = 1/n where zeta
+varies, too. Cases that take longer than a limit are cut (in runs that name no commit
 those with too many branches, too). The tables show how many there are.
 
 **To repeat.** `make stress` repeats everything. One run, and the page:
