@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -157,6 +158,22 @@ def test_a_saved_orbit_comes_back_in_a_model_that_has_visited_nothing(tmp_path: 
     assert again.model is not orbit.model and again.itinerary == orbit.itinerary
     np.testing.assert_allclose(again.joints, orbit.joints, atol=1e-12)
     assert again.signature.segments == orbit.signature.segments
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_signatures_do_not_depend_on_what_was_asked_before(composing: Any, seed: int) -> None:
+    """Whatever modes were visited, and of whatever modes the followers were looked up."""
+    texts = []
+    for asked in (False, True):
+        model = composing(chain, 6, 12, f"asked-{asked}")
+        orbit = cf.find_orbit(model, {"F": np.random.default_rng(seed).uniform(0.8, 1.5)})
+        modes = [mode for mode, _ in orbit.itinerary]
+        k = np.random.default_rng(seed).integers(6)
+        beside = [f"{mode[:k]}s{mode[k + 1 :]}" for mode in modes]  # another contact sticks
+        for at in product([*modes, *beside] if asked else [], [s.name for s in model.surfaces]):
+            model.targets.get(at)
+        texts.append(str(orbit.signature))
+    assert texts[0] == texts[1]
 
 
 def test_forces_and_work_of_contacts(composing: Any) -> None:

@@ -274,8 +274,9 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     for surface in (s for s, side in reset.lands.items() if side != 0):
         rate, mode = probe.rate(fits[0].own_mode, surface, t, behind), fits[0].own_mode
         away = max(d.signs[surface] * rate for d in fits if d.own_mode == mode)
-        if abs(rate) <= _STILL * (1.0 + abs(probe.rate(before.own_mode, name, t, y))):
-            continue  # a plastic impact: it rests on the surface, and forces say for how long
+        still = abs(rate) <= _STILL * (1.0 + abs(probe.rate(before.own_mode, name, t, y)))
+        if still and any(d.signs[surface] == 0 for d in model.domains):
+            continue  # a plastic impact: forces say for how long it rests on the surface
         if not away > 0.0:
             observable = model.surface_by_name[surface].observable
             return (

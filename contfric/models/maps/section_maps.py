@@ -168,17 +168,12 @@ class SectionMaps:
 
     def _leads_on(self, walk: Sequence[str]) -> bool:
         """Tell whether each domain of a cyclic walk can follow the one before, but for resets and holds."""
-        pairs = zip(walk, (*walk[1:], *walk[:1]), strict=True)
-        return all(b in self._followers.get(a, (b,)) for a, b in pairs if b in self._followers)
-
-    @cached_property
-    def _followers(self) -> dict[str, set[str]]:
-        found: dict[str, set[str]] = {domain.name: set() for domain in self.domains}
-        for (name, _), target in self.transitions.items():
-            found[name].add(target)
-        for (name, _), targets in self.targets.items():
-            found[name].update(targets)
-        return found
+        ends = zip(walk, (*walk[1:], *walk[:1]), strict=True)
+        known = (pair for pair in ends if all(name in self.domain_by_name for name in pair))
+        return all(
+            any(b == self.transitions.get(at) or b in self.targets.get(at, ()) for at in exits)
+            for exits, b in (([(a, s.name) for s in self.surfaces], b) for a, b in known)
+        )
 
     @property
     def stops_at_joints(self) -> bool:
