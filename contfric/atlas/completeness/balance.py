@@ -26,10 +26,10 @@ from contfric.errors import ContfricError
 from contfric.events.bifurcation import Bifurcation, EndReason, Kind
 from contfric.events.incident.unit import unit_of
 from contfric.events.local.touching import leads_elsewhere
-from contfric.orbit.canonical.slides import modulo
 from contfric.orbit.index import index_at_infinity, index_of
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
+from contfric.simulation.dense import stretches
 from contfric.simulation.simulate import simulate
 
 if TYPE_CHECKING:
@@ -196,8 +196,8 @@ def _rests(orbit: Orbit, parameter: str, value: float) -> bool:
         return False
     still = bool(np.abs(np.array([*run.states, run.last[2]]) - state).max() < _STILL)
     modes = [mode for mode, _ in run.itinerary]
-    lasts = modulo(np.diff(run.times, prepend=time), orbit.period / orbit.periods)
-    stays = all(map(model.is_at_rest, np.compress(lasts >= _NO_TIME * orbit.period, modes)))
+    lasting = (part for part in stretches(run) if part.duration >= _NO_TIME * orbit.period)
+    stays = all(model.is_at_rest(part.mode) for part in lasting)
     sliding = all(model.mode_by_name[mode].sliding for mode in modes)
     rests = bool(run.last[3]) and model.is_at_rest(run.last[3])
     return (stays and rests) or (sliding and (still or all(map(model.is_at_rest, modes))))
