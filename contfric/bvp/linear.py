@@ -161,7 +161,7 @@ def pencil_of_turn(system: System, joints: FloatArray, vector: FloatArray) -> Fl
     from contfric.bvp.saltation import pass_when_due
 
     a, b, _, _ = jacobian_blocks(system, joints, vector)
-    pass_when_due(system, joints, vector, a, b)
+    pass_when_due(system, vector, a, b)
     pencil = np.empty((2, *a.shape[1:]))
     turn_pencil(a, b, pencil)
     return pencil

@@ -35,9 +35,7 @@ _FEW = 4
 _SMALL = 1e-2
 
 
-def pass_when_due(
-    system: System, joints: FloatArray, vector: FloatArray, a: FloatArray, b: FloatArray
-) -> None:
+def pass_when_due(system: System, vector: FloatArray, a: FloatArray, b: FloatArray) -> None:
     """Replace the rows of joints at which the rate of the exit does not matter, in the blocks of a turn.
 
     Parameters
@@ -45,38 +43,29 @@ def pass_when_due(
     a, b : blocks on z_i and z_{i+1}, shape (N, m, m); changed in place
     """
     model, itinerary = system.model, system.itinerary
-    view = FlowView(model, vector)
-    after = following_modes(model, itinerary, system.half)
-    for i, ((mode, exit_), following) in enumerate(zip(itinerary, after, strict=True)):
+    for i, (mode, exit_) in enumerate(itinerary):
         if is_hold(exit_) or is_hold(itinerary[(i + 1) % len(itinerary)][1]):
             continue  # what is held has equations of its own
-        last = i + 1 == len(itinerary)
-        end = _end(system, joints, view, i)
-        slope = view.gradient(model.surface_by_name[exit_].observable, *end)
+        slope = b[i, -1].copy()  # the row says that the joint lies on the surface
         if not _is_small(slope, b[i, :-1, 0]):
             continue
+        following = following_modes(model, itinerary, system.half)[i]
         passage = passage_at(model, mode, exit_, following)  # of few joints, as it takes a while
         if passage is Passage.JUMP:
             continue
         if passage is Passage.PROJECTED:
-            project = _projection(view, slope[1:], (mode, exit_, following))
+            project = _projection(FlowView(model, vector), slope[1:], (mode, exit_, following))
             a[i, :-1], b[i, :-1, 0] = project @ a[i, :-1], project @ b[i, :-1, 0]
         a[i, -1], b[i, -1] = 0.0, 0.0
         if not model.autonomous:
             b[i, -1, 0] = 1.0
-        elif last:  # the column of the time at the end of a flow is the field there
+        elif i + 1 == len(
+            itinerary
+        ):  # the column of the time at the end of a flow is the field there
             field = b[i, :-1, 0]
             b[i, -1, 1:] = field / (np.linalg.norm(field) or 1.0)
         else:
             a[i, -1, 0], b[i, -1, 0] = -1.0, 1.0
-
-
-def _end(system: System, joints: FloatArray, view: FlowView, i: int) -> tuple[float, FloatArray]:
-    """Return time and state at the end of segment i: that of the last is the image of the first joint."""
-    if i + 1 < len(joints):
-        return float(joints[i + 1, 0]), joints[i + 1, 1:]
-    layout = system.layout
-    return float(joints[0, 0]) + layout.turn * view.period, layout.closure @ joints[0, 1:]
 
 
 def _is_small(slope: FloatArray, field: FloatArray) -> bool:
