@@ -101,8 +101,8 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
     ax : Axes, optional
         Where to draw, such as the axes of basins; new axes by default.
     """
-    new = ax is None
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     first, second = found.orbit.model.states
     for half, breaks in zip(found.states, found.breaks, strict=True):
         for part in np.split(half, breaks):
@@ -110,7 +110,7 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
                 *part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}"
             )
     (mark,) = ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
-    if new:
+    if alone:
         texts = "stable set", f"{found.orbit.name}, unstable"
         ax.legend([line, mark], texts, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     if not ax.get_xlabel():

@@ -59,8 +59,8 @@ def plot_equilibria(
     >>> plot_equilibria(branch).get_ylabel()
     '$x$'
     """
-    new = ax is None
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     name = branch.model.states[0] if state is None else state
     values = branch.state(name)
     looks = list(zip(branch.stable.tolist(), branch.admissible.tolist(), strict=True))
@@ -82,7 +82,7 @@ def plot_equilibria(
         first = last
     _draw_events(ax, branch, branch.model.states.index(name))
     name_axes(ax, parameter_label(branch.parameter), ax.get_ylabel() or parameter_label(name))
-    if new:
+    if alone:
         _explain(ax)
     return ax
 
@@ -101,12 +101,13 @@ def plot_equilibrium_diagram(
     """
     new = ax is None
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     if new:
         ax.set_xlim(*found.bounds)
     for branch in found.branches:
         plot_equilibria(branch, ax=ax, state=state)
     ax.set_xlabel(parameter_label(found.parameter), fontsize=sized(TEXT + 1))
-    if new:
+    if alone:
         _explain(ax)
     return ax
 
