@@ -91,7 +91,7 @@ def unwritable(path: Path, error: OSError) -> str:
         remedy = "the folder is read-only: write to another one"
     elif error.errno in (errno.ENOTDIR, errno.EEXIST, errno.EISDIR):
         remedy = "a file stands where a folder should be, or the other way round: use another name"
-    elif error.errno == errno.ENOENT:
+    elif error.errno == errno.ENOENT and not path.parent.is_dir():
         remedy = f"make the folder {path.parent} first"
     else:
         remedy = "write to another place"

@@ -22,7 +22,10 @@ _MOST_BYTES, _MOST_ENTRIES = 100_000, 20_000
 #: Words for true and false other than these two, which are names elsewhere.
 _TRUTH = {"yes": True, "on": True, "no": False, "off": False}
 #: What keeps YAML from reading a text with a colon.
-_COLON = "; a text with ': ' in it needs quotes"
+_HINTS = {
+    "mapping values": "; a text with ': ' in it needs quotes",
+    "found character '\\t'": ", a tab: indent with spaces",
+}
 #: Levels of nesting whose lines are kept.
 _DEEPEST = 4
 #: Brackets within brackets: a study nests four. Where a thousand are open PyYAML takes ten seconds.
@@ -82,7 +85,7 @@ def read_yaml(path: Path) -> LocatedYaml:
         data = None if node is None else loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        hint = _COLON if str(error.problem).startswith("mapping values") else ""
+        hint = next((h for start, h in _HINTS.items() if str(error.problem).startswith(start)), "")
         raise NotationError(f"{path}:{line}: not valid YAML: {error.problem}{hint}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # ValueError: scalars that look like a date but are not one
@@ -157,7 +160,9 @@ def _text(path: Path) -> str:
     except OSError as error:
         raise NotationError(f"cannot read {path}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
-        raise NotationError(f"{path}:1: is no UTF-8 text: {error.reason}") from None
+        raise NotationError(
+            f"{path}:1: is no UTF-8 text: {error.reason}; save it as UTF-8"
+        ) from None
 
 
 def as_truth(value: Any) -> Any:

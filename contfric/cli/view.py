@@ -21,6 +21,8 @@ def view(options: argparse.Namespace) -> int:
 
     need_bokeh()  # before anything is read
     source: Path = options.folder / DIAGRAM
+    if options.folder.is_file():
+        raise ResultFileError(f"{options.folder} is a file; give the folder that a run wrote")
     if not source.is_file():
         raise ResultFileError(f"{options.folder} holds no diagram: {source} is missing")
     diagram = load(source)

@@ -80,13 +80,14 @@ def box_of(
     ParameterError
         For anything but two different parameters of the model with a finite range each.
     """
-    if len(items_of(parameters)) != 2:
+    pair = items_of(parameters)
+    if len(pair) != 2:
         raise ParameterError(
             f"a curve needs a pair of parameters, such as {model.parameter_names[:2]}, got "
             f"{shown(parameters)}"
         )
-    found = ranges_of(model, parameters, ranges)
-    return PlaneRanges(parameters, found.low, found.high)
+    found = ranges_of(model, pair, ranges)
+    return PlaneRanges(pair, found.low, found.high)
 
 
 def ranges_of(

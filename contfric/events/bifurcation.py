@@ -66,7 +66,8 @@ class Kind(str, Enum):
         for kind in cls:
             if name is kind or (isinstance(name, str) and name == kind.value):
                 return kind
-        hint = did_you_mean(str(name), [kind.value for kind in cls])
+        meant = _ELSEWHERE.get(str(name).upper(), name)
+        hint = did_you_mean(str(meant), [kind.value for kind in cls])
         raise ParameterError(f"there is no kind of bifurcation {name!r}{hint}")
 
 
@@ -81,6 +82,9 @@ _MEANINGS = {
     Kind.GS: "grazing-sliding",
     Kind.T: "tangency: segments relabelled",
 }
+
+#: What COCO, AUTO and MatCont call some kinds.
+_ELSEWHERE = {"LP": "SN", "LPC": "SN", "FP": "SN", "BPC": "BP", "TR": "NS"}
 
 #: Kinds at which a branch of one reduced itinerary cannot go on.
 TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})

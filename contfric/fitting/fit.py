@@ -112,6 +112,7 @@ def fit(
     model = load_model(model)
     check_executor(executor)
     function_of("progress", progress)
+    params = model.given_params(params)
     names, start = check_fit(model, data, params, free)
     problem = _Problem(model, tuple(data), dict(params), names, executor, progress)
     with kept_in(folder):

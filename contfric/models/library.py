@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from contfric.base.resources import bundled_dir
 from contfric.errors import ContfricError, ModelError, ParameterError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.paths import SUFFIXES, is_path
+from contfric.models.paths import SUFFIXES, is_path, not_a_file
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -57,8 +57,7 @@ def _named(name: str) -> Model:
         if folder is not None and name in (files := _in_folder(folder)):
             return _read(files[name])
     raise ParameterError(
-        f"unknown model '{name}'{did_you_mean(str(name), names())}. "
-        f"A file needs its suffix: {name}.yaml"
+        f"unknown model '{name}'{did_you_mean(str(name), names())}. {not_a_file(name)}"
     )
 
 

@@ -5,6 +5,7 @@ Reading a file takes far more to import.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 SUFFIXES = (".yaml", ".yml")
@@ -13,6 +14,21 @@ SUFFIXES = (".yaml", ".yml")
 def is_path(name: str | Path) -> bool:
     """Return whether this is the path of a file, not a name: of a text, if it has the suffix, or a folder."""
     return isinstance(name, Path) or name.endswith(SUFFIXES) or "/" in name or "\\" in name
+
+
+def not_a_file(name: str) -> str:
+    """Return what is said of an unknown name: how the path of a YAML file is told from a name.
+
+    Examples
+    --------
+    >>> not_a_file("mine"), not_a_file("mine.txt")
+    ('A file needs its suffix: mine.yaml', 'A file needs the suffix .yaml or .yml')
+    """
+    if os.path.isdir(name):  # False for a text that is no path at all
+        return f"{name} is a folder: give the YAML file in it"
+    if Path(name).suffix:
+        return f"A file needs the suffix {' or '.join(SUFFIXES)}"
+    return f"A file needs its suffix: {name}{SUFFIXES[0]}"
 
 
 def relative_name(name: str, file: Path) -> str | Path:

@@ -102,11 +102,17 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
         Where to draw, such as the axes of basins; new axes by default.
     """
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     first, second = found.orbit.model.states
     for half, breaks in zip(found.states, found.breaks, strict=True):
         for part in np.split(half, breaks):
-            ax.plot(*part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}")
-    ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
+            (line,) = ax.plot(
+                *part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}"
+            )
+    (mark,) = ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
+    if alone:
+        texts = "stable set", f"{found.orbit.name}, unstable"
+        ax.legend([line, mark], texts, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
     if not ax.get_xlabel():
         name_axes(ax, parameter_label(first), parameter_label(second))
     return ax

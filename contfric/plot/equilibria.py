@@ -14,6 +14,7 @@ from contfric.plot.appearance.style import (
     BLACK,
     GREY,
     LINE_WIDTH,
+    NEXT_TO,
     SMALL,
     STABLE,
     TEXT,
@@ -59,6 +60,7 @@ def plot_equilibria(
     '$x$'
     """
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     name = branch.model.states[0] if state is None else state
     values = branch.state(name)
     looks = list(zip(branch.stable.tolist(), branch.admissible.tolist(), strict=True))
@@ -73,10 +75,15 @@ def plot_equilibria(
             color=BLACK if admissible else lighter(GREY),
             linewidth=LINE_WIDTH if admissible else 0.5 * LINE_WIDTH,
             zorder=2,
+            label=("stable" if stable else "unstable")
+            if admissible
+            else "virtual: outside of its mode",
         )
         first = last
     _draw_events(ax, branch, branch.model.states.index(name))
     name_axes(ax, parameter_label(branch.parameter), ax.get_ylabel() or parameter_label(name))
+    if alone:
+        _explain(ax)
     return ax
 
 
@@ -94,19 +101,29 @@ def plot_equilibrium_diagram(
     """
     new = ax is None
     ax = axes_or_new(ax)
+    alone = not ax.has_data()
     if new:
         ax.set_xlim(*found.bounds)
     for branch in found.branches:
         plot_equilibria(branch, ax=ax, state=state)
     ax.set_xlabel(parameter_label(found.parameter), fontsize=sized(TEXT + 1))
+    if alone:
+        _explain(ax)
     return ax
+
+
+def _explain(ax: Axes) -> None:
+    """Write a legend next to the axes: each kind of line, and each event, once."""
+    once = {text: artist for artist, text in zip(*ax.get_legend_handles_labels(), strict=True)}
+    ax.legend(once.values(), once.keys(), fontsize=sized(SMALL), frameon=False, **NEXT_TO)
 
 
 def _draw_events(ax: Axes, branch: EquilibriumBranch, k: int) -> None:
     for event in branch.events:
         height = float(np.asarray(event.equilibrium.state)[k])
         look = _MARKERS[event.kind.value].look()
-        (mark,) = ax.plot([event.value], [height], zorder=5, **look)
+        text = f"{event_label(event.label)}: {event.meaning}"
+        (mark,) = ax.plot([event.value], [height], zorder=5, label=text, **look)
         mark.set_gid(event.label)
         ax.annotate(
             event_label(event.label),

@@ -183,7 +183,8 @@ def checked_values(model: Model, name: str, given: ArrayLike) -> FloatArray:
     ParameterError
         If they are not.
     """
-    if name not in model.states:
+    given_name: object = name  # whatever the user gave
+    if not isinstance(given_name, str) or name not in model.states:
         model.index_of(name)
     return ascending(name, given)
 

@@ -270,8 +270,8 @@ def _owner(path: Path, header: dict[str, Any], model: Model | None) -> Model:
     for key, value in _told_apart(owner).items():
         if header[key] != value:
             raise ResultFileError(
-                f"{path} was written for {key} {header[key]}, the model has {value}: run its study "
-                "again"
+                f"{path} was written for {key} {header[key]}, not {value}: give its own model, or run its "
+                "study again"
             )
     return owner
 

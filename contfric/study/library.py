@@ -7,7 +7,7 @@ from pathlib import Path
 
 from contfric.base.resources import bundled_dir
 from contfric.errors import StudyError, did_you_mean, shown
-from contfric.models.paths import SUFFIXES, is_path
+from contfric.models.paths import SUFFIXES, is_path, not_a_file
 
 
 def study_names() -> list[str]:
@@ -53,7 +53,7 @@ def study_path(source: str | Path) -> Path:
     # fig5 is fig05, and not fig15, which differs from it by one letter as well
     padded = re.sub(r"(?<!\d)\d$", lambda digit: f"0{digit.group()}", text)
     hint = did_you_mean(padded, names)
-    raise StudyError(f"unknown study '{text}'{hint}. A file needs its suffix: {text}.yaml")
+    raise StudyError(f"unknown study '{text}'{hint}. {not_a_file(text)}")
 
 
 def _file(path: Path) -> Path:

@@ -110,6 +110,12 @@ def read_study(source: str | Path) -> Study:
 
 def _validated(located: LocatedYaml) -> StudyFile:
     data = dict(located.data)
+    if "model" not in data and "states" in data:
+        located.fail(
+            ("states",),
+            "this is a model, not a study: `contfric check` reads it, and a study names it (model: "
+            f"{located.path.name})",
+        )
     start = data.get("start")
     if start == "simulate" or start == {"simulate": None}:
         data["start"] = {"simulate": {}}

@@ -138,6 +138,11 @@ def one_line(capsys) -> str:
         (HEAD + "explore: {parameter: Omega, range: [0.6, 0.4]}\n", ":3: the range [0.6, 0.4] is"),
         (HEAD + "explore: {parameter: Omega, range: [0.5, 0.5]}\n", ":3: the range [0.5, 0.5] is"),
         ("model: [\n", ":2: not valid YAML"),
+        ("name: gap\nstates: [x, v]\n", ":2: this is a model, not a study"),
+        (
+            "model: coulomb\nparams:\n\tS: 0.3\n",
+            ":3: not valid YAML: found character '\\t' that cannot start any token, a tab: indent",
+        ),
     ],
 )
 @pytest.mark.parametrize("name", ["run", "explain"])
@@ -154,6 +159,8 @@ def test_bad_study(study, tmp_path, capsys, monkeypatch, name, text, message) ->
     [
         (["run", "fig5"], "unknown study 'fig5'; did you mean 'fig05'"),
         (["explain", "none.yaml"], "there is no file none.yaml"),
+        (["run", "."], ". is a folder: give the YAML file in it"),
+        (["run", "run.txt"], "A file needs the suffix .yaml or .yml"),
         (["rnu", "fig05"], "unknown command 'rnu'; did you mean 'run'"),
         (["run"], "required: STUDY (see: contfric run --help)"),
         (

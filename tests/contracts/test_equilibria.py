@@ -92,6 +92,9 @@ modes:
 
 def test_figures_tell_stable_from_unstable(popp: cf.EquilibriumDiagram) -> None:
     ax = popp.plot()
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"stable", "unstable"} < set(texts) and len(texts) == len(set(texts))
+    assert any("Hopf point" in text for text in texts)
     styles = {line.get_linestyle() for line in ax.get_lines()}
     assert {"-", "--"} <= styles
     assert [line.get_gid() for line in ax.get_lines() if line.get_marker() == "h"] == ["H-"]

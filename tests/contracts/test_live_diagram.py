@@ -252,6 +252,10 @@ def test_view_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture
     message = capsys.readouterr().err
     assert "diagram.npz" in message
     assert message.count("\n") == 1
+    file = tmp_path / "study.yaml"
+    file.write_text("model: coulomb\n")
+    assert main(["view", str(file)]) == 2
+    assert "is a file; give the folder that a run wrote" in capsys.readouterr().err
 
 
 # --------------------------------------------------------------------------- in a browser

@@ -32,7 +32,10 @@ ODD = [
     *(None, "x", "0.5", -1, 1.5, True, float("nan"), [], {}, [1, 2], ("a", "b")),
     *(np.array([0.6, 0.4]), np.array(0.5), object(), 10**400, b"x", lambda: 1, 1 + 1j, " "),
     *({"Omega": "0.5"}, {"Omega": None}, {"omega": 0.5}, {"Omega": np.array([0.5, 0.6])}, {1: 2}),
+    *({"Omega": (0.5, 0.6), "S": (0.3, 0.34)}, ("Omega", "S")),
 ]
+
+DATA = [cf.Measured("x_max", 1.42, 0.01, {"Omega": 0.5})]
 
 #: Arguments of calls that end at once, whatever is given for them.
 CALLS = {
@@ -52,6 +55,10 @@ CALLS = {
     "values": lambda o, d, x: cf.Seeds(values=x),
     "pair": lambda o, d, x: cf.continue_bifurcation(d.bifurcations[0], x, RANGES),
     "ranges": lambda o, d, x: cf.continue_bifurcation(d.bifurcations[0], ("Omega", "S"), x),
+    "swapped": lambda o, d, x: cf.explore_plane(o, x, ("Omega", "S")),
+    "held": lambda o, d, x: cf.continue_quantity(o, "x_max", 1.4, x, ("Omega", "S")),
+    "swept": lambda o, d, x: cf.sweep("coulomb", x, "Omega"),
+    "fit": lambda o, d, x: cf.fit("coulomb", DATA, x, "S"),
     "sections": lambda o, d, x: sections_of(o, box_of(o.model, ("Omega", "S"), RANGES), x),
     "section": lambda o, d, x: sections_of(o, box_of(o.model, ("Omega", "S"), RANGES), {"S": x}),
     "kinds": lambda o, d, x: cf.explore_plane(o, ("Omega", "S"), RANGES, kinds=x, max_step=2.0),
@@ -92,6 +99,12 @@ def test_every_odd_argument_is_told_in_one_line(orbit, diagram, name) -> None:
     [
         ("of_kind", "XX", "no kind of bifurcation 'XX'.*Valid: SN, BP, PD, NS, CS, SS, AS, GS, T"),
         ("of_kind", "sn", "'sn'.*did you mean 'SN'"),
+        ("of_kind", "LP", "'LP'; did you mean 'SN'"),
+        ("of_kind", "TR", "'TR'; did you mean 'NS'"),
+        ("row", "amplitude", r"no row 'amplitude' in a diagram\. Valid: x_max"),
+        ("swapped", RANGES, r"ranges is a mapping, such as \{'Omega'.*got \('Omega', 'S'\)"),
+        ("held", RANGES, "ranges is a mapping"),
+        ("swept", np.array([0.4, 0.5]), "no parameter .*Valid: Omega"),
         ("segments", 3, "names of domains, as a list or joined by '->', got 3"),
         ("Signature", None, "needs a model, or the name of one, got None"),
         ("time", "0.5", "time is a finite number, got '0.5'"),

@@ -459,3 +459,7 @@ def test_an_interrupted_write_leaves_the_old_file(orbit, tmp_path, monkeypatch) 
 def test_missing_folder_is_named(orbit, tmp_path) -> None:
     with pytest.raises(cf.ResultFileError, match=r"make the folder .*none first"):
         cf.save(orbit, tmp_path / "none" / "x.npz")
+    missing = OSError(
+        errno.ENOENT, "No such file or directory"
+    )  # as where a system makes no folders
+    assert files.unwritable(tmp_path / "x", missing).endswith("write to another place")

@@ -171,7 +171,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(NotationError, match="cannot read"):
         load_signature(tmp_path)
     (tmp_path / "latin.yaml").write_bytes(b"name: \xe9\n")
-    with pytest.raises(NotationError, match=r"latin\.yaml:1: is no UTF-8"):
+    with pytest.raises(NotationError, match=r"latin\.yaml:1: is no UTF-8 .*; save it as UTF-8"):
         load_signature(tmp_path / "latin.yaml")
 
 

@@ -86,7 +86,10 @@ def test_it_goes_on_from_its_folder(
 
 def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
     assert len(edge.to_dataframe()) == len(edge.points)
-    assert edge.plot().get_xlabel() == "$x$"
+    ax = edge.plot()
+    assert ax.get_xlabel() == "$x$"
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == ["stable set", f"{edge.orbit.name}, unstable"]
     cf.save(edge, tmp_path / "edge.npz")
     again = cf.load(tmp_path / "edge.npz")
     np.testing.assert_array_equal(again.points, edge.points)

@@ -25,6 +25,20 @@ def test_chaos_is_told_from_motion_that_contracts() -> None:
     assert "stay close" in str(why_none(contracts, 100, None, compared=True))
 
 
+#: Omega and S of chaotic attractors of `coulomb` whose exponent is so small (0.003 to 0.006 per unit of time)
+#: that two solutions part by a factor of less than 1000 in 100 periods.
+WEAK = [(0.45, 0.03), (0.48, 0.08), (0.5, 0.03), (0.5, 0.05), (0.51, 0.03), (0.53, 0.03)]
+
+
+@pytest.mark.parametrize(("omega", "friction"), WEAK)
+def test_weak_chaos_is_not_called_quasi_periodic(omega, friction) -> None:
+    params = {"Omega": omega, "S": friction, "S0": 0.4}
+    exponents = cf.lyapunov_exponent("coulomb", params)
+    assert exponents.motion is cf.Motion.CHAOTIC and exponents.largest < 0.006
+    with pytest.raises(cf.AperiodicError, match="it is chaotic"):
+        cf.find_orbit("coulomb", params)
+
+
 @pytest.mark.slow
 def test_a_large_structure_that_is_chaotic_is_called_so_in_seconds() -> None:
     with pytest.raises(cf.AperiodicError, match=r"found in 1\d\d\d periods.*it is chaotic"):

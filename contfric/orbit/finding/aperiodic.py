@@ -36,6 +36,9 @@ _TURNS = 8
 #: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
 #: part by a larger factor than quasi-periodic ones, in proportion to time, could.
 _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
+#: Weak chaos is seen late, so a share of the periods that were simulated is compared, up to so many times
+#: more. An exponent of 0.005 where the frequency is 0.5 is seen after 200 periods.
+_SHARE, _LONGER = 0.1, 20
 #: A simulation that ends on a surface is on it to rounding, or a little more at a small angle.
 _ON = 1e-9
 
@@ -55,13 +58,13 @@ def why_none(
     ----------
     done : periods that were simulated
     slow : a return (events, periods, mismatch) that is nearly exact
-    compared : whether it is worth 200 periods more to tell whether the solution is chaotic
+    compared : whether it is worth up to a fifth of the periods more to tell whether the solution is chaotic
     """
     if slow is not None:
         return ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
     if _grows(trajectory):
         return ConvergenceError(_unbounded(trajectory), trajectory)
-    text = _advice(trajectory, done) + (_parting(trajectory) if compared else "")
+    text = _advice(trajectory, done) + (_parting(trajectory, done) if compared else "")
     return AperiodicError(text, trajectory)
 
 
@@ -137,15 +140,16 @@ def _advice(trajectory: Trajectory, done: int) -> str:
     )
 
 
-def _parting(trajectory: Trajectory) -> str:
+def _parting(trajectory: Trajectory, done: int) -> str:
     """Return what two solutions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
     moved = np.array([not is_clock(name) for name in model.states])
     shift = moved * _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
-    compared = _COMPARED
+    least = _COMPARED
     if model.autonomous:  # a unit of time says nothing of how often something happens
         passed = float(trajectory.last[1]) - trajectory.begin[0]
-        compared = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
+        least = math.ceil(_COMPARED * max(1.0, passed / max(1, len(trajectory))))
+    compared = max(least, min(int(_SHARE * done), _LONGER * least))
     length = compared / clock_period(model, model.vector(trajectory.params))
     try:
         one, other = (
@@ -157,12 +161,15 @@ def _parting(trajectory: Trajectory) -> str:
     if {one.end, other.end} != {SimulationEnd.TIME}:
         return ""
     apart = float(np.max(np.abs(one.last[2] - other.last[2]) / (1.0 + np.abs(one.last[2]))))
-    if apart > _CHAOTIC * _APART:
+    if apart > _CHAOTIC * compared / least * _APART:
         return (
             f". Solutions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it "
             "is chaotic, or a long transient of chaos"
         )
-    return ". Solutions that begin close stay close: it is quasi-periodic, or it converges slowly"
+    return (
+        f". Solutions that begin close stay close for {compared} periods: it is quasi-periodic, or it "
+        "converges slowly"
+    )
 
 
 def goes_on(trajectory: Trajectory) -> str:
