@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -41,7 +41,14 @@ from contfric.plot import (
     plot_transition_graph,
     save_figure,
 )
-from contfric.plot.appearance.labels import _MEASURE, _UPDATE, Anchor, lay_out, place_labels
+from contfric.plot.appearance.labels import (
+    _MEASURE,
+    _UPDATE,
+    Anchor,
+    lay_out,
+    line_pixels,
+    place_labels,
+)
 from contfric.plot.appearance.names import event_label, parameter_label, surface_label
 from contfric.plot.appearance.style import (
     BRIDGE_COLOUR,
@@ -767,3 +774,38 @@ def test_an_integral_over_a_doubled_orbit_is_counted_twice_at_its_doubling() -> 
         assert np.max(np.abs(np.diff(values))) < 0.1 * own
         (mark,) = marks_of(diagram.bifurcations, diagram.branches, row, "a")
         np.testing.assert_allclose(mark.y, [own, 2.0 * own] if cycles == 2.0 else [own], rtol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lines_are_sampled_inside_of_the_axes_only(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ax = Figure().subplots()
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    x, y = np.sort(rng.uniform(-0.5, 1.5, 30)), rng.uniform(-0.5, 1.5, 30)
+    y[rng.integers(30, size=4)] = 10.0 ** rng.uniform(0.5, [1.0, 2.0, 8.0, 16.0])
+    ax.plot(x, y)
+    pixels, box = line_pixels(ax), ax.bbox.padded(1.001)  # matplotlib clips a pixel outside
+    assert np.all((pixels > box.min) & (pixels < box.max))
+    found = ax.transData.inverted().transform(pixels)
+    # brute force: 5,000 points of each segment, those inside of the axes
+    share = np.linspace(0.0, 1.0, 5_001)[:, None]
+    inside = np.concatenate(
+        [
+            part[np.all((part > 0.0) & (part < 1.0), axis=1)]
+            for part in (a + share * (b - a) for a, b in pairwise(np.column_stack([x, y])))
+        ]
+    )
+    gaps = [np.abs(found - point).max(axis=1).min() for point in inside[::50]]
+    assert max(gaps) < 0.02  # a spacing is 0.008 of the width
+
+
+def test_multipliers_that_grow_without_bound_leave_the_axes() -> None:
+    fixed = {"w": 1.0, "k": 1.0, "c": 0.1, "d": 1.0, "e": 0.8}
+    orbit = cf.find_orbit("impact", {"A": 0.9, **fixed})
+    branch = cf.continue_orbit(orbit, "A", (0.01, 1.0))  # ends at a grazing impact
+    sizes = branch.quantity("multiplier")
+    assert sizes.max() > 1e9
+    ax = branch.plot(row="multiplier")
+    assert 0.0 <= ax.get_ylim()[0] < sizes.min()
+    assert np.sort(sizes)[-2] < ax.get_ylim()[1] < 100.0
+    assert [text.get_text()[:12] for text in ax.texts] == [r"$\mathrm{SN}"]

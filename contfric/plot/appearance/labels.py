@@ -16,8 +16,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.path import Path
 from matplotlib.text import Annotation
-from matplotlib.transforms import Bbox
+from matplotlib.transforms import Bbox, BboxBase
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
@@ -219,8 +220,8 @@ class _Counts:
 
 
 def line_pixels(ax: Axes) -> FloatArray:
-    """Return points along all lines of the axes, evenly spaced in pixels, shape (m, 2)."""
-    found = [np.empty((0, 2))]
+    """Return points along all lines inside of the axes, evenly spaced in pixels, shape (m, 2)."""
+    found, spacing = [np.empty((0, 2))], _SPACING * _point_size(ax)
     for line in ax.lines:
         if line.get_linestyle() in ("None", "none", "", " ") or not line.get_visible():
             continue
@@ -228,9 +229,19 @@ def line_pixels(ax: Axes) -> FloatArray:
         gaps = np.flatnonzero(~np.isfinite(points).all(axis=1))
         for piece in np.split(points, gaps):
             drawn = piece[np.isfinite(piece).all(axis=1)]
-            if len(drawn) > 1:
-                found.append(_sampled(drawn, _SPACING * _point_size(ax)))
+            found += [_sampled(part, spacing) for part in _inside(drawn, ax.bbox) if len(part) > 1]
     return np.vstack(found)
+
+
+def _inside(points: FloatArray, box: BboxBase) -> list[FloatArray]:
+    """Return the parts of a line inside of a box: one that leaves it by far has points beyond number."""
+    if len(points) < 2:
+        return []
+    left, bottom, right, top = box.extents
+    path = Path(points).cleaned(clip=(left, bottom, right, top))
+    assert path.codes is not None
+    starts = np.flatnonzero(np.isin(path.codes, (Path.MOVETO, Path.STOP)))
+    return np.split(path.vertices, starts)[:-1]  # the last one is no vertex
 
 
 def _sampled(points: FloatArray, spacing: float) -> FloatArray:

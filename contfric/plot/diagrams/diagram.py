@@ -49,6 +49,11 @@ if TYPE_CHECKING:
 
 #: Width of a figure (inches) below which numbers along its axis would meet, and its parts then.
 _COLUMN, _TICKS = 4.5, 5
+#: Space above and below what is drawn, as a share of its height.
+_MARGIN = 0.12
+#: Ratio of a multiplier to the next smaller one above which it is without bound: between two points of a
+#: branch a multiplier grows by less, and at a grazing impact it is what rounding leaves of infinity, 1e13.
+_SPIKE = 1e6
 
 
 def plot_branches(
@@ -271,7 +276,9 @@ def draw_row(
         else:
             _draw_branch(ax, branch, row, look)
     draw_marks(ax, marks)
-    ax.margins(y=0.12)
+    ax.margins(y=_MARGIN)
+    if row == "multiplier":
+        _cut_spikes(ax)
     displacement = branches[0].model.states[0] if branches else "x"
     across = parameter_label(branches[0].parameter) if branches else None
     name_axes(ax, across, label.name(displacement))
@@ -280,6 +287,15 @@ def draw_row(
         middle.set(ha="center", fontsize=sized(TEXT))
     if ax.figure.bbox.width / ax.figure.dpi < _COLUMN:
         ax.locator_params(axis="x", nbins=_TICKS)
+
+
+def _cut_spikes(ax: Axes) -> None:
+    """Let lines leave the axes where multipliers grow without bound, as at a grazing impact."""
+    drawn = np.concatenate([[], *(np.asarray(line.get_ydata()) for line in ax.lines)])
+    sizes = np.unique(np.maximum(drawn[np.isfinite(drawn)], 1.0))
+    spikes = np.flatnonzero(sizes[1:] > _SPIKE * sizes[:-1])
+    if len(spikes):
+        ax.set_ylim(0.0, (1.0 + _MARGIN) * sizes[spikes[0]])
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
