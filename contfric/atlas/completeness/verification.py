@@ -28,7 +28,13 @@ from contfric.atlas.completeness.degenerate import (
     unresolved,
 )
 from contfric.atlas.leaving.short_branches import is_short
-from contfric.atlas.matching import INSIDE, identity_of, on_branch, same_location
+from contfric.atlas.matching import (
+    INSIDE,
+    guesses,
+    identity_of,
+    on_branch,
+    same_location,
+)
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.points import LARGEST_STEP
@@ -330,10 +336,24 @@ def _covers(known: Branch, branch: Branch) -> bool:
     length = float(branch.arc[-1])
     locations = (int(np.searchsorted(branch.arc, share * length)) for share in INSIDE)
     along = (branch[k] for k in locations if 0 < k < len(branch) - 1)
-    ways = along, (_inside(branch, share) for share in INSIDE), _starts(branch)
+    inside = (_inside(branch, share) for share in INSIDE)
+    ways = along, inside, _starts(branch), _at_inner_values(branch)
     # most points of a period that grows without bound are at one value, where each would be compared with all
-    inside = chain(*(ways[::-1] if _grows(branch) else ways))
-    return any(on_branch(orbit, known) for orbit in inside if orbit.converged)
+    orbits = chain(*(ways[::-1] if _grows(branch) else ways))
+    return any(on_branch(orbit, known) for orbit in orbits if orbit.converged)
+
+
+def _at_inner_values(branch: Branch) -> Iterator[Orbit]:
+    """Yield orbits of a branch, solved at values of its parameter in the middle of its range.
+
+    Where most of its length is at nearly one value, its points are not determined by that.
+    """
+    low, width = float(branch.values.min()), float(np.ptp(branch.values))
+    active = branch.model.index_of(branch.parameter)
+    for value in (low + share * width for share in INSIDE):
+        vector = branch.vector.copy()
+        vector[active] = value
+        yield from (refine(guess, damped=False) for _, guess in guesses(branch, vector, value))
 
 
 def _as_narrow(known: Branch, branch: Branch, diagram: Diagram) -> bool:

@@ -69,10 +69,20 @@ def slides_of(orbit: Orbit) -> list[int]:
 
 
 def _goes_on(orbit: Orbit, before: int, i: int) -> bool:
-    """Tell whether a segment goes on in the mode and from the state in which another one ended."""
-    if i == before or orbit.itinerary[before][0] != orbit.itinerary[i][0]:
+    """Tell whether a segment goes on in the mode and from the state in which another one ended.
+
+    In the short time between them what rests stays where it is, and what else moves goes on as in the mode.
+    """
+    mode, end, begin = orbit.itinerary[i][0], orbit.ends[before, 1:], orbit.begins[i, 1:]
+    if i == before or orbit.itinerary[before][0] != mode:
         return False
-    return bool(np.max(np.abs(orbit.begins[i, 1:] - orbit.ends[before, 1:])) < SAME_SOLUTION)
+    apart = np.abs(begin - end)
+    between = range(before + 1, i if i > before else i + len(orbit.itinerary))
+    if between and apart.max() >= SAME_SOLUTION:
+        later = float(orbit.durations[[k % len(orbit.itinerary) for k in between]].sum())
+        moved = orbit.flow.state(mode, float(orbit.ends[before, 0]), end, later)
+        apart = np.minimum(apart, np.abs(begin - moved))
+    return bool(apart.max() < SAME_SOLUTION)
 
 
 def stands_still(orbit: Orbit, i: int) -> bool:
