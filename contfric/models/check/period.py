@@ -18,6 +18,8 @@ from contfric.models.check.probe import Probe
 _SAME = 1e-8
 #: A time after which anything that depends on it is another, without excitation.
 _LATER = 0.7310585
+#: Parts of a period that are tried: squares and moduli of a sine have halves, a carrier has many.
+_PARTS = range(12, 1, -1)
 #: States that are drawn for each mode, and at most asked: what is so at four random ones is so everywhere.
 _DRAWN = (40, 4)
 #: What to write for an angle, and for one with a wall: no solution turns past that.
@@ -25,16 +27,48 @@ _AS_ANGLE = "write 'angles: [{0}]': only then solutions that go round are period
 _AS_WALL = "write its walls as sin(({0} - wall)/2) = 0: only then they are met in each turn"
 
 
-def changed_after_a_period(probe: Probe, modes: Sequence[str], t: float, y: FloatArray) -> str:
-    """Return what differs one period later at a state: the field of a mode, an observable, or nothing."""
-    later = t + (probe.period or _LATER)
+def changed_after_a_period(
+    probe: Probe, modes: Sequence[str], t: float, y: FloatArray, share: float = 1.0
+) -> str:
+    """Return what differs a share of the period later at a state: a field, an observable, or nothing."""
+    later = t + share * (probe.period or _LATER)
     for mode in modes:
         if not _same(probe.field(mode, t, y), probe.field(mode, later, y)):
             return f"the field of '{mode}'"
-    for name in probe.model.observable_index:
+    for name in (n for n in probe.model.observable_index if n != probe.model.phase):
         if not _same(probe.flow.observe(name, t, y), probe.flow.observe(name, later, y)):
             return f"observable '{name}'"
     return ""
+
+
+def _parts_of_the_period(probe: Probe) -> int:
+    """Return in how many equal parts of the period all that depends on time is the same; 1 without any."""
+    model = probe.model
+    places = [
+        (mode.name, *place) for mode in model.modes for place in probe.places(mode.name, *_DRAWN)
+    ]
+    met = [(r.surface, *place) for r in model.resets for place in probe.on(r.surface, _DRAWN[1])]
+
+    def same(share: float) -> bool:
+        later = share * probe.period
+        return not any(
+            changed_after_a_period(probe, [m], t, y, share) for m, t, y in places
+        ) and all(_same(probe.reset(r, t, y), probe.reset(r, t + later, y)) for r, t, y in met)
+
+    if probe.period <= 0.0 or not places or same(_LATER):
+        return 1
+    return next((n for n in _PARTS if same(1.0 / n)), 1)
+
+
+def repeats_sooner(probe: Probe) -> str:
+    """Return what to write where all that depends on time has a shorter period than the file says."""
+    if (parts := _parts_of_the_period(probe)) == 1:
+        return ""
+    return (
+        f"at these parameters all that depends on t is the same 1/{parts} of the period later: divide "
+        f"'period' by {parts}. With this one, multipliers are to the power {parts}, period doublings may be "
+        "called branch points, and branches have copies, later by a part of the period"
+    )
 
 
 def undeclared_angles(probe: Probe) -> dict[str, str]:

@@ -8,7 +8,12 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.check.passages import check_left, crossed_limits, other_side
-from contfric.models.check.period import changed_after_a_period, not_periodic, undeclared_angles
+from contfric.models.check.period import (
+    changed_after_a_period,
+    not_periodic,
+    repeats_sooner,
+    undeclared_angles,
+)
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
@@ -355,6 +360,8 @@ def check_period(report: ModelReport, probe: Probe) -> None:
             if what := changed_after_a_period(probe, [mode.name], *place):
                 report.error(Topic.PERIOD, not_periodic(what, probe.period, "the defaults"))
                 return
+    if text := repeats_sooner(probe):
+        report.warn(Topic.PERIOD, text)
 
 
 def check_angles(report: ModelReport, probe: Probe) -> None:

@@ -22,6 +22,7 @@ from contfric.models.reading.schema_values import (
     MODES,
     NOTHING,
     SIDE,
+    Default,
     Ends,
     Expression,
     Expressions,
@@ -30,7 +31,6 @@ from contfric.models.reading.schema_values import (
     Line,
     Matrix,
     Modes,
-    Number,
     Rates,
     Side,
     Sides,
@@ -63,7 +63,10 @@ def _kind_of_parameter(value: Any) -> str:
 class Parameter(SchemaPart):
     """A parameter."""
 
-    default: Number = said("a finite number", "the default of '{}' must be a finite number")
+    default: Default = said(
+        "a finite number, or one by arithmetic such as 3*pi/180",
+        "the default of '{}' must be a finite number, or one by arithmetic such as 3*pi/180",
+    )
     meaning: Text = ""
 
 

@@ -116,6 +116,7 @@ Sides: TypeAlias = Annotated[
 ]
 Modes: TypeAlias = Annotated[list[str], BeforeValidator(_listed), said(MODES)]
 Number: TypeAlias = Annotated[float, said("a finite number", gt=-_LARGEST, lt=_LARGEST)]
+Default: TypeAlias = Annotated[Number, BeforeValidator(_number)]
 Unit: TypeAlias = Annotated[float, BeforeValidator(_number), Field(gt=_SMALL_UNIT, lt=_LARGE_UNIT)]
 Units: TypeAlias = Annotated[
     dict[str, Unit],
