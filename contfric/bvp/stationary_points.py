@@ -42,11 +42,9 @@ def find_stationary(functions, layout, i, c, z, p, last, stationary):  # type: i
 
 @helper
 def find_after_reset(functions, layout, i, c, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
-    """Do the same for a segment after a reset."""
+    """Do the same for a segment after a reset; chatter of no duration still tells whether it is pressed."""
     after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
     duration = after[0] - z[i, 0]
-    if duration <= 0.0:
-        return 0
     apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     begin = workspace.behind[n, :n]
     return functions.stationary(

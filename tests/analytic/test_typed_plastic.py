@@ -42,6 +42,20 @@ def test_a_ball_that_does_not_bounce(tmp_path: Path, share: float) -> None:
     assert orbit.durations[rests] == pytest.approx([2.0 * np.pi / w - lasts], abs=1e-9)
 
 
+@pytest.mark.parametrize("case", range(3))
+def test_rest_on_a_table_ends_where_it_has_no_duration(tmp_path: Path, case: int) -> None:
+    draw = np.random.default_rng(case)
+    g, w = float(draw.uniform(0.5, 2.0)), float(draw.uniform(0.6, 1.6))
+    unit = g / w**2
+    model = typed(tmp_path, BALL.format(a=draw.uniform(2.0, 3.0) * unit, g=g, w=w))
+    branch = cf.continue_orbit(cf.find_orbit(model), "a", (1.5 * unit, 4.0 * unit))
+    # it leaves the table at sin(w*t) = 1/share with the table's speed, and is back after a whole period
+    last = branch.bifurcations[-1]
+    assert last.params["a"] == pytest.approx(np.sqrt(1.0 + np.pi**2) * unit, rel=1e-9)
+    assert branch.values[-1] == last.params["a"]
+    assert all(orbit.admissible for orbit in branch)
+
+
 FLOOR = """
 name: floor
 coordinates: [q]

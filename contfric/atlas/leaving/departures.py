@@ -44,7 +44,12 @@ def follow_departure(
     text = "the branch that leaves along the null vector"
     if direction is None and leave_short(state, orbit, event, reason, text):
         return
-    for departure, distance, known in _departures(orbit, settings, direction, state.known):
+    along = direction or null_direction(orbit)
+    if along is None:
+        why = "its equations have no derivatives here"
+        state.judge(event, text, Decision.REFUSED, why=why)
+        return
+    for departure, distance, known in _departures(orbit, settings, along, state.known):
         if known is not None:
             state.judge(event, text, Decision.KNOWN, known)
             return
@@ -65,12 +70,11 @@ def follow_departure(
 def _departures(
     orbit: Orbit,
     settings: Settings,
-    direction: Direction | None,
+    along: Direction,
     known: Callable[[Orbit], int | None],
 ) -> Iterator[tuple[BranchStart, float, int | None]]:
     """Yield departures with their distances, and the branch that is there if it is known."""
     active = orbit.model.index_of(settings.parameter)
-    along = direction or null_direction(orbit)
     overshot: list[float] = []
     for distance in chain(NEARER, overshot):  # those that overshoot something come last
         departure = leave_along(orbit, settings, along, distance)
@@ -143,7 +147,9 @@ def _begin(state: Exploration, event: Event) -> None:
     else:
         return
     settings = settings_for(orbit, state.settings)
-    for departure, distance, known in _departures(orbit, settings, None, state.known):
+    if (along := null_direction(orbit)) is None:
+        return
+    for departure, distance, known in _departures(orbit, settings, along, state.known):
         if known is None:
             trace_side(orbit, departure.point, settings, first_step=_first_step(distance, settings))
         return

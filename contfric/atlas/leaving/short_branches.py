@@ -212,6 +212,8 @@ def short_branch(
     phi : its null vector, one way
     """
     phi = null_vector(orbit) if phi is None else phi
+    if phi is None:
+        return None
     tip = replace(orbit, joints=orbit.joints + nearest(orbit) * phi)
     if not np.any((orbit.margins > 0.0) & (tip.margins < 0.0)):
         return None  # as most branches do it goes farther
@@ -261,6 +263,8 @@ def short_branch_to(orbit: Orbit, settings: Settings, event: Event) -> Branch | 
         return None
     whole = vertex.as_whole() if reason is EndReason.BP else vertex.doubled()
     phi = null_vector(whole)
+    if phi is None:
+        return None
     branches = (short_branch(whole, settings, start, reason, way) for way in (phi, -phi))
     return next((b for b in branches if b is not None and _meets(b, event, settings)), None)
 

@@ -43,20 +43,25 @@ class BranchStart(NamedTuple):
     origin: Point
 
 
-def null_vector(orbit: Orbit) -> FloatArray:
+def null_vector(orbit: Orbit) -> FloatArray | None:
     """Return the unit null vector of a system that is singular at fixed parameters, shape (N, m).
 
-    By the singular value decomposition of the assembled Jacobian; done once a branch point.
+    By the singular value decomposition of the assembled Jacobian; done once a branch point. None where that
+    has entries that are no numbers, as where a field has no derivative.
     """
     count, m = orbit.joints.shape
     full = assembled(orbit.system, orbit.joints, orbit.vector)
-    vector: FloatArray = np.linalg.svd(full)[2][-1].reshape(count, m)
+    try:
+        vector: FloatArray = np.linalg.svd(full)[2][-1].reshape(count, m)
+    except np.linalg.LinAlgError:
+        return None
     return vector / float(np.sqrt(np.sum(vector**2) / count))
 
 
-def null_direction(orbit: Orbit) -> Direction:
+def null_direction(orbit: Orbit) -> Direction | None:
     """Return the direction of the null vector of a singular orbit, in which the parameter stands."""
-    return Direction(null_vector(orbit), 0.0)
+    phi = null_vector(orbit)
+    return None if phi is None else Direction(phi, 0.0)
 
 
 @foreseeable()

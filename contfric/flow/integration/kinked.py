@@ -79,9 +79,10 @@ def first_crossing(motion, piece, t, h, on, p, workspace):  # type: ignore[no-un
         right = node(motion, piece, c, 0.0, t + h, workspace.end, workspace.last, p, workspace)
         if is_flat(left, right, h):
             continue
-        if on == k:
+        starts_on = on == k or left[0] == 0.0  # as a state at rest is on the kink of abs(v)
+        if starts_on:
             left = (0.0, left[1], left[2])
-        sign, multiple = leaving(left, on == k)
+        sign, multiple = leaving(left, starts_on)
         begins = 0.0
         if sign == 0.0:
             begins = _FLAT * h
@@ -178,8 +179,9 @@ def next_kink(motion, piece, t, y, on, left, p, workspace, behind):  # type: ign
     found, which = -1.0, -1
     for k in range(motion.kinks):
         c = motion.kink_of[k]
+        starts_on = on == k or motion.observe(c, t, y, p, workspace.none, workspace.empty) == 0.0
         at = first_hit(
-            motion, piece, c, 0.0, on == k, t, y, left, p, workspace, workspace.stage[:n]
+            motion, piece, c, 0.0, starts_on, t, y, left, p, workspace, workspace.stage[:n]
         )
         if at >= 0.0 and (which < 0 or at < found):
             write(workspace.stage[:n], behind)
@@ -199,8 +201,12 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
     phase = t0 - folded(t0, period) * period
     kink = -1
     for k in range(motion.kinks):
-        if on and target == 0.0 and c == motion.kink_of[k]:
-            kink = k
+        if target != 0.0 or c != motion.kink_of[k]:
+            continue
+        if not on and motion.observe(c, phase, here, p, workspace.none, workspace.empty) == 0.0:
+            write(here, y1)
+            return 0.0
+        kink = k if on else kink
     piece = piece_at(motion, mode, phase, here, kink, p, workspace)
     done = 0.0
     while done < dt_max:

@@ -3,8 +3,9 @@
 Functions with kinks are classes of their own, so that their derivatives are what motion away from the
 kink sees: ``d abs(x) = sign(x)``, ``d sign(x) = 0``, and ``where`` differentiates both of its sides.
 (Sympy's own would bring Dirac's delta and Heaviside's step.) A power whose exponent is no whole number is a
-class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not, and a little
-beyond b = 0, where an integrator looks, it goes on as ``-|b|**e``.
+class, too: the derivative ``e b**(e - 1)`` is finite at b = 0 where ``e b**e / b`` is not (also with e < 1,
+where a factor 0 takes it away), and a little beyond b = 0, where an integrator looks, it goes on as
+``-|b|**e``.
 
 This module imports sympy; it is loaded when a model is built for the first time.
 """
@@ -31,6 +32,10 @@ _EXACT_POWER = 64
 _LARGEST = sys.float_info.max
 #: Places at which a formula is evaluated before it is simplified; digits there, and what may be rounding.
 _TRIED, _DIGITS, _ROUNDING = 2, 30, 1e-15
+#: Base at which a slope of a power is taken where the base is 0 and the slope may be infinite: what rounding
+#: makes of the 0 of a base of size 1. A factor that vanishes there, as in ``abs(v)*abs(v)**0.9``, makes a
+#: product of 0, which is its limit, and not ``0*inf``.
+_BASE_AT_ZERO = sympy.Rational(1, 2**53)
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
@@ -95,7 +100,10 @@ class Power(sympy.Function):  # type: ignore[misc]
     def fdiff(self, argindex: int = 1) -> Any:
         """Return the derivative with respect to the base or the exponent."""
         b, e = self.args
-        return e * Power(b, e - 1) if argindex == 1 else PowerLog(b, e)
+        if argindex != 1:
+            return PowerLog(b, e)
+        finite = e.is_number and e > 1
+        return e * Power(b if finite else Where(Abs(b), b, _BASE_AT_ZERO), e - 1)
 
 
 class PowerLog(sympy.Function):  # type: ignore[misc]
