@@ -1,4 +1,4 @@
-"""A branch takes few solves: points are predicted well, and no trial of a location follows rounding."""
+"""A location takes few solves: no trial follows rounding."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 
 import contfric as cf
 from contfric.base.tally import tally
-from contfric.continuation.core.geometry import cubic_share, quintic_share
 from contfric.continuation.locating import change_of_sign
 
 #: Rounding of a margin at a located event, several units in the last place of numbers of order 1.
@@ -22,22 +21,6 @@ STARTS = [
     ({"Omega": 0.415, "S": 0.098, "S0": 0.2}, "Omega", (0.3, 0.55)),
     ({"Omega": 0.56, "S": 0.315, "S0": 0.476}, "Omega", (0.4, 0.7)),
 ]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_a_polynomial_is_predicted_exactly(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    h1, h2, step = rng.uniform(0.05, 0.4, 3)
-    for degree in (3, 5):
-        curve = np.polynomial.Polynomial(rng.normal(size=degree + 1))
-        (z, z1, z2), (t, t1, t2) = (
-            [f(s) for s in (0, -h1, -h1 - h2)] for f in (curve, curve.deriv())
-        )
-        value = z + step * t + cubic_share.py_func(z, t, z1, t1, h1, step)
-        more = quintic_share.py_func((z, z1, z2, t, t1, t2), h1, h2, step)
-        assert value + more == pytest.approx(curve(step), abs=1e-10)
-        if degree == 3:
-            assert abs(more) < 1e-10
 
 
 @pytest.mark.parametrize("params, parameter, bounds", STARTS)

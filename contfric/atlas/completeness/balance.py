@@ -135,7 +135,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         most = min(diagram.settings.copies, diagram.settings.max_periods // period)
         for times in range(1, most + 1):
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
-            rest = _rest_of(diagram, node)
+            rest = _ended(diagram, node, EndReason.REST)  # the mass stays at rest for ever
             if rest is not None and below is not None and above is not None:
                 beside = _REST_BESIDE * width
                 below += _rests(rest, diagram.parameter, value - beside)
@@ -165,11 +165,6 @@ def _frees(orbit: Orbit, test: EventFunction) -> bool:
         < kept
         for t in targets
     )
-
-
-def _rest_of(diagram: Diagram, node: Node) -> Orbit | None:
-    """Return the orbit at an event after which the mass stays at rest for ever; None at others."""
-    return _ended(diagram, node, EndReason.REST)
 
 
 def _ended(diagram: Diagram, node: Node, reason: EndReason) -> Orbit | None:
@@ -377,7 +372,8 @@ def _wanted(diagram: Diagram, value: float) -> int | None:
 
 
 def _sum_at(diagram: Diagram, value: float) -> int | None:
-    resting = (orbit for node in diagram.nodes if (orbit := _rest_of(diagram, node)) is not None)
+    rests = (_ended(diagram, node, EndReason.REST) for node in diagram.nodes)
+    resting = (orbit for orbit in rests if orbit is not None)
     total = int(any(_rests(orbit, diagram.parameter, value) for orbit in resting))
     for branch in diagram.branches:
         if branch.system.periods != 1:

@@ -20,11 +20,6 @@ from numpy.typing import NDArray
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.compiled import blocks, helper, i8, indices, matrix, table, vector
 
-#: Steps before that are shorter than this share of the next one tell nothing of its fifth derivative.
-_SHORT = 0.1
-#: Share of what the cubic adds to the tangent below which what the quintic adds to that is a correction.
-_SMOOTH = 0.05
-
 
 class Points(NamedTuple):
     """The points of a branch or curve as the march writes them, one a row.
@@ -134,98 +129,36 @@ def largest_state(z):  # type: ignore[no-untyped-def]
 
 
 @helper
-def cubic_share(z, t, z1, t1, back, step):  # type: ignore[no-untyped-def]
-    """Return how far the cubic through two points and their slopes is off the tangent at the last one.
-
-    That is ``A x^2 + B x^3`` with ``A = (2 t + t1 - 3 D) / h`` and ``B = (t + t1 - 2 D) / h^2``, D the chord
-    over h.
-    """
-    x, chord = step / back, (z - z1) / back
-    return step * x * ((2.0 * t + t1 - 3.0 * chord) + x * (t + t1 - 2.0 * chord))
-
-
-@helper
-def quintic_share(values, h1, h2, step):  # type: ignore[no-untyped-def]
-    """Return how far the quintic through three points and slopes is off the cubic through the last two.
-
-    In Newton's form it is ``x^2 (x + h1)^2 (c + d (x + h1 + h2))``, and both factors follow from what the
-    cubic misses the third point and its slope by. ``values`` are (z, z1, z2, t, t1, t2), the last point's
-    first.
-    """
-    z, z1, z2, t, t1, t2 = values
-    back, chord = h1 + h2, (z - z1) / h1
-    square, cube = (2.0 * t + t1 - 3.0 * chord) / h1, (t + t1 - 2.0 * chord) / (h1 * h1)
-    there = back * h2 * back * h2
-    miss = z2 - (z - back * (t - back * (square - back * cube)))
-    slope = t2 - (t - back * (2.0 * square - 3.0 * back * cube))
-    c = miss / there
-    d = (slope + 2.0 * c * back * h2 * (back + h2)) / there
-    here = step * (step + h1)
-    return here * here * (c + d * (step + back))
-
-
-@helper
-def shares_of(points, k, step):  # type: ignore[no-untyped-def]
-    """Return both shares by what they are linear in, (t, t1, z1 - z) and (t, t1, t2, z1 - z, z2 - z).
-
-    Zero without the points that they need, and the quintic's where steps are so much shorter before that it
-    would multiply rounding.
-    """
-    arc, none = points.arc, 0.0
-    cubic, quintic = (none, none, none), (none, none, none, none, none)
-    h1 = arc[k] - arc[k - 1] if k > 0 else none
-    h2 = arc[k - 1] - arc[k - 2] if k > 1 else none
-    if h1 > 0.0:
-        cubic = (
-            cubic_share(0.0, 1.0, 0.0, 0.0, h1, step),
-            cubic_share(0.0, 0.0, 0.0, 1.0, h1, step),
-            cubic_share(0.0, 0.0, 1.0, 0.0, h1, step),
-        )
-    if min(h1, h2) > _SHORT * step:
-        quintic = (
-            quintic_share((0.0, 0.0, 0.0, 1.0, 0.0, 0.0), h1, h2, step),
-            quintic_share((0.0, 0.0, 0.0, 0.0, 1.0, 0.0), h1, h2, step),
-            quintic_share((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), h1, h2, step),
-            quintic_share((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), h1, h2, step),
-            quintic_share((0.0, 0.0, 1.0, 0.0, 0.0, 0.0), h1, h2, step),
-        )
-    return cubic, quintic
-
-
-@helper
-def shares_at(values, shares):  # type: ignore[no-untyped-def]
-    """Return what the cubic and the quintic add, of one number: (z, z1, z2, t, t1, t2)."""
-    z, z1, z2, t, t1, t2 = values
-    (a, b, c), (d, e, f, g, h) = shares
-    return a * t + b * t1 + c * (z1 - z), d * t + e * t1 + f * t2 + g * (z1 - z) + h * (z2 - z)
-
-
-@helper
 def predict(points, k, step):  # type: ignore[no-untyped-def]
     """Write the predicted point and the last tangent to row k + 1.
 
-    By the cubic through the last two points and their tangents. The quintic through the last three is added
-    where it is far nearer to the cubic than that is to the tangent: else it is no smooth curve.
+    The cubic through the last two points and their tangents, ``z_k + t_k x + A x^2 + B x^3`` with
+    ``A = (2 t_k + t_{k-1} - 3 D) / h`` and ``B = (t_k + t_{k-1} - 2 D) / h^2``, D the chord over h.
     """
-    zs, ws, tzs, tws = points.joints, points.w, points.tangents, points.directions
-    one, two, row, shares = max(k - 1, 0), max(k - 2, 0), k + 1, shares_of(points, k, step)
-    bend = change = 0.0
+    zs, ws, tzs, tws, arc = points.joints, points.w, points.tangents, points.directions, points.arc
+    back = arc[k] - arc[k - 1] if k > 0 else 0.0
+    square, cube = 0.0, 0.0
+    if back > 0.0:
+        square, cube = step * step / back, step**3 / (back * back)
     for i in range(zs.shape[1]):
         for j in range(zs.shape[2]):
-            z, t, z2, t2 = zs[k, i, j], tzs[k, i, j], zs[two, i, j], tzs[two, i, j]
-            values = z, zs[one, i, j], z2, t, tzs[one, i, j], t2
-            cubic, quintic = shares_at(values, shares)
-            zs[row, i, j], tzs[row, i, j] = z + (step * t + cubic), quintic
-            bend, change = max(bend, abs(cubic)), max(change, abs(quintic))
-    taken = 1.0 if change < _SMOOTH * bend else 0.0
-    for i in range(zs.shape[1]):
-        for j in range(zs.shape[2]):
-            zs[row, i, j] += taken * tzs[row, i, j]
-            tzs[row, i, j] = tzs[k, i, j]
+            t = tzs[k, i, j]
+            value = zs[k, i, j] + step * t
+            if back > 0.0:
+                chord = (zs[k, i, j] - zs[k - 1, i, j]) / back
+                before = tzs[k - 1, i, j]
+                value += square * (2.0 * t + before - 3.0 * chord)
+                value += cube * (t + before - 2.0 * chord)
+            zs[k + 1, i, j] = value
+            tzs[k + 1, i, j] = t
     for j in range(ws.shape[1]):
-        w, t, w2, t2 = ws[k, j], tws[k, j], ws[two, j], tws[two, j]
-        cubic, quintic = shares_at((w, ws[one, j], w2, t, tws[one, j], t2), shares)
-        ws[row, j], tws[row, j] = w + (step * t + cubic + taken * quintic), t
+        t = tws[k, j]
+        value = ws[k, j] + step * t
+        if back > 0.0:
+            chord = (ws[k, j] - ws[k - 1, j]) / back
+            value += square * (2.0 * t + tws[k - 1, j] - 3.0 * chord)
+            value += cube * (t + tws[k - 1, j] - 2.0 * chord)
+        ws[k + 1, j], tws[k + 1, j] = value, t
 
 
 @helper

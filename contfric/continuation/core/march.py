@@ -1,8 +1,8 @@
 """Pseudo-arclength continuation, compiled: of branches, and of curves in two parameters.
 
 A branch is a curve ``(z(s), w(s))`` of joints and free parameters of the chain of segments: of one parameter,
-or of q with q - 1 conditions (:mod:`contfric.curves.core.march`). From three points with unit tangents the
-next one is predicted by the quintic through them (Hermite), and corrected in the plane normal to the
+or of q with q - 1 conditions (:mod:`contfric.curves.core.march`). From two points with unit tangents the
+next one is predicted by the cubic through both (Hermite), and corrected in the plane normal to the
 last tangent (H. B. Keller, 1977). The step follows the curvature: the angle between consecutive
 tangents is kept near a target. Arclength between points is the chord c with the correction for its
 arc, ``c (1 + angle^2 / 24)``.
