@@ -139,8 +139,8 @@ class AperiodicError(ConvergenceError):
 #: More valid names than these are no line to read: then the nearest ones.
 _MOST_NAMES, _NEAREST = 24, 12
 #: Least likeness of a name that is suggested: 'om' is like 'Omega' (0.57), but 'amplitude' is not like
-#: 'multiplier' (0.53).
-_ALIKE = 0.55
+#: 'multiplier' (0.53). Of two letters one may be wrong.
+_ALIKE, _ALIKE_SHORT = 0.55, 0.5
 
 
 def did_you_mean(given: object, valid: Iterable[str]) -> str:
@@ -157,7 +157,8 @@ def did_you_mean(given: object, valid: Iterable[str]) -> str:
     }
     best = max(likeness.values(), default=0.0)
     close = [f"'{name}'" for name in likeness if likeness[name] == best]
-    hint = f"; did you mean {' or '.join(close)}?" if best >= _ALIKE and len(close) <= 2 else "."
+    least = _ALIKE if len(str(given)) > 2 else _ALIKE_SHORT
+    hint = f"; did you mean {' or '.join(close)}?" if best >= least and len(close) <= 2 else "."
     if len(names) <= _MOST_NAMES:
         return f"{hint} Valid: {', '.join(names)}"
     nearest = sorted(names, key=lambda name: -likeness[name])[:_NEAREST]

@@ -116,7 +116,6 @@ def test_bundled_files_have_their_own_name(name: str) -> None:
 #: (what is written in the place of what, line of the error, what its message says)
 MISTAKES = [
     ("constraints:", "constrains:", 6, "did you mean 'constraints'?"),
-    ("S: 0.2", "S: '1e-2'", 5, "a number has no quotes"),
     ("default: 0.5", "defualt: 0.5", 4, "did you mean 'default'?"),
     ("S: 0.2", "sin: 0.2", 5, "means a function"),
     ("S: 0.2", "lambda: 0.2", 5, "word of Python; write lambda_ or λ"),

@@ -3,9 +3,7 @@
 A trial is predicted by the cubic through both ends of the step and their tangents, and corrected
 normal to the tangent between them. Places are chosen by Chandrupatla's method (Adv. Eng. Software 28
 (1997) 145-149): inverse quadratic interpolation where the values are monotone enough for it, bisection
-elsewhere. The bracket shrinks until both of its values are rounding, or to the resolution of the arithmetic,
-or of the flow where that is integrated. A trial so near to an end that values differ by rounding only says
-nothing: none is made there, and next to an end that is rounding the other side is looked for.
+elsewhere; the bracket shrinks to the resolution of the arithmetic, or of the flow where that is integrated.
 """
 
 from __future__ import annotations
@@ -23,11 +21,6 @@ _LEFT = 1e-9
 #: Two trials that are farther apart than this many times the way between their locations lie on two sheets: a
 #: step is refused whose ends differ by a third of a radian in direction.
 _APART = 100.0
-#: Nearest that a trial is kept from an end of the bracket for the sake of rounding (arclength): where values
-#: are small all along a step they are known better than that.
-_KEPT_OFF = 1e-13
-#: Trials that look for the other side next to one that is rounding; a value that jumps has none there.
-_NUDGES = 3
 #: Trials after which a bracket has the width of the arithmetic, whatever the function.
 _MOST_TRIALS = 120
 
@@ -74,13 +67,6 @@ def copy_row(points, target, source):  # type: ignore[no-untyped-def]
     points.arc[target] = points.arc[source]
 
 
-@helper
-def kept_off(low, high, f_low, f_high, noise, length):  # type: ignore[no-untyped-def]
-    """Return the share of a step over which a value changes by half of its rounding, by its secant."""
-    share = 0.5 * noise * (high - low) / (f_low - f_high)
-    return min(share, _KEPT_OFF / length) if length > 0.0 else share
-
-
 class Rules(NamedTuple):
     """How a bracket is narrowed down.
 
@@ -88,7 +74,7 @@ class Rules(NamedTuple):
     ----------
     accuracy : of a trial
     two_sided : whether the value has the sign that it has before, or is positive there
-    noise : values below this are rounding, and so are two that differ by twice as much
+    noise : value that is rounding
     narrowest : width of a bracket that is as narrow as can be
     given_up : width below which it is not narrowed down where trials fail, 0 where sheets are not told apart
     """
@@ -139,8 +125,7 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
         zs, ws, sign = points.joints, points.w, -1.0 if rules.two_sided and ends[0] < 0.0 else 1.0
         f_low, f_high = limited(sign * ends[0]), limited(sign * ends[1])
         low, high, x, best, best_f, left = 0.0, 1.0, 0.5, 0.0, f_low, _LEFT * f_low
-        x_old, f_old, lost, solved, nudges = low, f_low, False, False, 0
-        length = abs(points.arc[1] - points.arc[0])
+        x_old, f_old, lost, solved = low, f_low, False, False
         reach = _APART * distance(zs[0], ws[0], zs[1], ws[1], way.scale)
         at_end = f_low > 0.0 and f_high > 0.0
         copy_row(points, 3, 1 if at_end else 0)
@@ -165,17 +150,11 @@ def bracketing(correct_at: Any, value_at: Any) -> Any:
                     lost = distance(zs[2], ws[2], zs[3], ws[3], way.scale) > reach * (x - low)
                     if lost:
                         break
-            if f == 0.0 or high - low <= narrowest or f_low - f_high <= 2.0 * noise:
+            if f == 0.0 or high - low <= narrowest or (f_low <= noise and f_high >= -noise):
                 break
             if lost and high - low < given_up:
                 break
-            off = max(0.25 * narrowest, kept_off(low, high, f_low, f_high, noise, length))
-            if abs(f) <= noise and nudges < _NUDGES:
-                nudges += 1
-                off = min(2.0**nudges * off, 0.5 * (high - low))
-                x = low + off if f > 0.0 else high - off
-            else:
-                x = next_trial(low, high, f_low, f_high, x_old, f_old, x, off)
+            x = next_trial(low, high, f_low, f_high, x_old, f_old, x, 0.25 * narrowest)
         return best, best_f, lost and best_f > left, solved
 
     return bracket

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from contfric.bvp.equations import close_chain
+from contfric.bvp.holds import NO_PIN
 from contfric.bvp.monitor import is_doubled
 from contfric.bvp.stationary_values import HERE
 from contfric.compiled import helper
@@ -52,8 +53,12 @@ def is_double_zero(way, points, k, i, share):  # type: ignore[no-untyped-def]
     """Tell whether what dips at the end of segment i touches zero as that segment has no length there.
 
     The speed of what is released at its start grows with the square of its duration, which changes its sign
-    over the step from row k: that is the event that ends the branch, and no pair.
+    over the step from row k: that is the event that ends the branch, and no pair. On a bridge it need not be
+    one: no margin says that a pinned hold lasts.
     """
+    for pin in way.layout.pins:
+        if pin != NO_PIN:
+            return False
     before = duration(way, points, k, i)
     after = duration(way, points, k + 1, i)
     return before * after < 0.0 and abs(share - before / (before - after)) < _ONE_LOCATION

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -41,12 +40,9 @@ from contfric.continuation.core.steps import (
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
 BY_TEST, BY_LABEL, BY_PARAMETER = range(3)
 
-#: A value of order 1 that is this small is rounding (twenty units in the last place, of an orbit of several
-#: segments); the slope of a parameter, of a width of 1, is known to ten times that, and is zero where the
-#: parameter is stationary.
-_NOISE, _OF_SLOPES = 5e-15, 5e-14
-#: Relative rounding of a parameter.
-_UNIT = 2.2e-16
+#: A value of order 1 that is this small is rounding (ten units in the last place, of an orbit of several
+#: segments): a narrower bracket would follow noise.
+_NOISE = 2e-15
 #: Shortest bracket (share of a step): the resolution of the arithmetic.
 _SHORTEST = 4e-16
 #: Widest share of a step that the rounding of an integrated flow may be (in steps that are hardly longer).
@@ -181,11 +177,7 @@ def rules_of(way, sought, kinked, points):  # type: ignore[no-untyped-def]
     of_branch = kind == BY_TEST and sought.number >= count_margins(layout)
     # margins and distances are positive before the event, the others have the sign that they have
     two_sided = kind == BY_PARAMETER or of_branch
-    noise = _NOISE
-    if kind == BY_PARAMETER:
-        noise = _UNIT * abs(sought.target)
-    elif of_branch and sought.number == count_margins(layout) + layout.labels.shape[0] + FOLD:
-        noise = _OF_SLOPES / math.sqrt(way.scale[0])
+    noise = 0.1 * _NOISE if two_sided else _NOISE  # slopes and products of multipliers have less
     # slopes and multipliers are those of the last Jacobian. Near a touch of a kink it changes with the root
     # of a distance: it must be that of the orbit, not one from which Newton is known to end there
     accuracy = ALONG if kinked and of_branch else AT_EVENT

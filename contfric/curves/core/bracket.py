@@ -18,7 +18,7 @@ from contfric.curves.core.correct import CurveProblemType, along_curve, correct_
 #: Share of a step to which a location is bracketed.
 _RESOLUTION = 4e-16
 #: Values below this are rounding: a narrower bracket would follow noise.
-_NOISE = 5e-15
+_NOISE = 2e-15
 #: What is left at a location that counts as found.
 _FOUND = 1e-6
 #: A margin without stationary points is infinite: this is as good, and fit for interpolation.
