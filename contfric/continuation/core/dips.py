@@ -8,9 +8,6 @@ from __future__ import annotations
 
 import math
 
-from contfric.bvp.equations import close_chain
-from contfric.bvp.holds import NO_PIN
-from contfric.bvp.monitor import is_doubled
 from contfric.bvp.stationary_values import HERE
 from contfric.compiled import helper
 from contfric.continuation.core.steps import EXTRA
@@ -19,9 +16,6 @@ from contfric.continuation.core.steps import EXTRA
 _SURE = 0.2
 #: Slopes are computed where a value is smaller than this times its change over two steps (see above).
 _NEAR = 1.0
-#: Share of a step within which a dip and the zero of a duration are at one location: the one is interpolated
-#: by three values or a cubic, the other by a line, and a step turns by a tenth of its length.
-_ONE_LOCATION = 0.1
 
 
 @helper
@@ -37,57 +31,13 @@ def earlier_of(at, share):  # type: ignore[no-untyped-def]
 
 
 @helper
-def duration(way, points, row, i):  # type: ignore[no-untyped-def]
-    """Return how long segment i lasts at one row of the points."""
-    z, equations = points.joints[row], way.workspace.equations
-    if i + 1 < z.shape[0]:
-        return z[i + 1, 0] - z[i, 0]
-    for k in range(way.which.shape[0]):
-        way.p[way.which[k]] = points.w[row, k]
-    close_chain(way.functions, way.layout, z, way.p, equations.none, equations)
-    return equations.last[0] - z[i, 0]
-
-
-@helper
-def is_double_zero(way, points, k, i, share):  # type: ignore[no-untyped-def]
-    """Tell whether what dips at the end of segment i touches zero as that segment has no length there.
-
-    The speed of what is released at its start grows with the square of its duration, which changes its sign
-    over the step from row k: that is the event that ends the branch, and no pair. On a bridge it need not be
-    one: no margin says that a pinned hold lasts.
-    """
-    for pin in way.layout.pins:
-        if pin != NO_PIN:
-            return False
-    before = duration(way, points, k, i)
-    after = duration(way, points, k + 1, i)
-    return before * after < 0.0 and abs(share - before / (before - after)) < _ONE_LOCATION
-
-
-@helper
-def ends_with(layout, column):  # type: ignore[no-untyped-def]
-    """Return the segment at whose end an exit or joint margin is taken; -1 of all else that is watched.
-
-    And of one that is watched without its double zero.
-    """
-    if is_doubled(layout, column):
-        return -1
-    i = column - layout.interior.shape[0]
-    if i < layout.exits.shape[0]:
-        return max(i, -1)
-    j = i - layout.exits.shape[0]
-    return layout.joint[j, 0] if j < layout.joint.shape[0] and layout.joint[j, 3] == 0 else -1
-
-
-@helper
-def dips(way, points, k, step):  # type: ignore[no-untyped-def]
+def dips(way, tests, k, arc, value, step):  # type: ignore[no-untyped-def]
     """Tell whether some test, positive at both ends of a step, is likely to be negative within.
 
     By the parabola through the last two points and the new one. What a label changes at has slopes, and is
     the least of many distances: no parabola.
     """
-    tests, value = points.tests, points.tests[k + 1]
-    back = points.arc[k] - points.arc[k - 1]
+    back = arc[k] - arc[k - 1]
     followed, interior = way.workspace.followed, way.layout.interior.shape[0]
     here = followed.slots[HERE]
     last = value.shape[0] - EXTRA
@@ -108,9 +58,7 @@ def dips(way, points, k, step):  # type: ignore[no-untyped-def]
         if at < step and abs(f1) + 0.5 * slope * at * math.copysign(1.0, f1) < _SURE * min(
             abs(f1), abs(f2)
         ):
-            i = ends_with(way.layout, j)
-            if i < 0 or not is_double_zero(way, points, k, i, at / step):
-                return True
+            return True
     return False
 
 

@@ -15,11 +15,6 @@ of them is seen at the points. Four signs of it are looked for before a point is
 * **By three points.** Of all other values (multipliers, and what has no slope here) the parabola through
   the last three points is taken.
 
-A margin at the end of a segment whose duration changes its sign may have a double zero there: that is the
-event at which the branch ends, and no pair (the velocity of a contact that is released just before another
-one stops). Such a step is not taken again, which would come nearer to the event by a share of the way each
-time.
-
 *When slopes are computed.* Each costs as much as the equations of its segment. Let f be a parabola over
 the last two steps with its vertex, and a change of sign, in the second one, which is at most 2.5 times the
 first. Then f changes over both by more than twice the smaller end value. Slopes are computed where it
@@ -47,13 +42,7 @@ from contfric.bvp.stationary_values import (
     segment_and_observable,
 )
 from contfric.compiled import helper
-from contfric.continuation.core.dips import (
-    changes_much,
-    cubic_dip,
-    earlier_of,
-    is_double_zero,
-    mean_dip,
-)
+from contfric.continuation.core.dips import changes_much, cubic_dip, earlier_of, mean_dip
 from contfric.continuation.core.touches import (
     PINNED,
     is_far,
@@ -150,17 +139,13 @@ def ends_dip(way, points, k, length):  # type: ignore[no-untyped-def]
         sign = layout.exit_signs[i]
         if sign != 0.0 and layout.pins[i] == NO_PIN and not is_far(points, k, column + i, length):
             values = margin_values(way, points, k, column + i, sign)
-            share = end_dip(way, points, k, values, i, layout.exits[i], True, length)
-            if share > 0.0 and not is_double_zero(way, points, k, i, share):
-                at = earlier_of(at, share)
+            at = earlier_of(at, end_dip(way, points, k, values, i, layout.exits[i], True, length))
     column += count
     for j in range(layout.joint.shape[0]):
         i, surface, sign = layout.joint[j, 0], layout.joint[j, 1], float(layout.joint[j, 2])
         if layout.joint[j, 3] == 0 and not is_far(points, k, column + j, length):
             values = margin_values(way, points, k, column + j, sign)
-            share = end_dip(way, points, k, values, i, surface, False, length)
-            if share > 0.0 and not is_double_zero(way, points, k, i, share):
-                at = earlier_of(at, share)
+            at = earlier_of(at, end_dip(way, points, k, values, i, surface, False, length))
     return at
 
 
