@@ -121,6 +121,6 @@ def test_no_branch_is_traced_twice(monkeypatch: pytest.MonkeyPatch) -> None:
         return traced[-1]
 
     monkeypatch.setattr(follow, "whole_branch", kept)
-    cf.explore(cf.find_orbit(model), "w", (0.7, 1.1), max_branches=17)
+    cf.explore(cf.find_orbit(model), "w", (0.7, 1.1), max_branches=45)
     spans = [(b.name, round(b.values.min(), 6), round(b.values.max(), 6)) for b in traced]
     assert len(set(spans)) == len(spans) > 5

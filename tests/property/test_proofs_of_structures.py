@@ -185,7 +185,10 @@ def test_a_symmetry_is_known_by_the_formulas(seed: int) -> None:
 @pytest.mark.parametrize("seed", [2, 3])
 def test_two_contacts_that_change_at_once_are_where_their_times_meet(seed: int) -> None:
     """The duration between them, by the engine's orbits on the branch, vanishes at the proved parameter."""
-    diagram = cf.explore(cf.find_orbit(two_contacts(seed), longest=500), "w", (0.6, 0.8))
+    orbit = cf.find_orbit(two_contacts(seed), longest=500)
+    diagram = cf.explore(
+        orbit, "w", (0.6, 0.8), max_step=2e-4
+    )  # five points tell where the time vanishes
     found = 0
     for branch in diagram.branches:
         for event in branch.bifurcations:
