@@ -64,7 +64,7 @@ class HandleType(types.Type):  # type: ignore[misc]
         return _known, (self.name,)
 
     def type_of(self, name: str) -> Any:
-        """Return the type of a member, None if there is none of that name."""
+        """Return the type of a member, None where no member has that name."""
         member = self.members.get(name)
         if member is not None:
             return types.int64 if isinstance(member, int) else member._numba_type_

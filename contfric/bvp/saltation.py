@@ -59,9 +59,7 @@ def pass_when_due(system: System, vector: FloatArray, a: FloatArray, b: FloatArr
         a[i, -1], b[i, -1] = 0.0, 0.0
         if not model.autonomous:
             b[i, -1, 0] = 1.0
-        elif i + 1 == len(
-            itinerary
-        ):  # the column of the time at the end of a flow is the field there
+        elif i + 1 == len(itinerary):  # the column of time at the end of a flow is the field there
             field = b[i, :-1, 0]
             b[i, -1, 1:] = field / (np.linalg.norm(field) or 1.0)
         else:

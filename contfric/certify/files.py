@@ -247,7 +247,7 @@ def _what_else(text: str) -> str:
     if not isinstance(data, dict) or "certificate" not in data:
         return "it is a JSON file without the entry 'certificate'"
     if data["certificate"] not in kinds:
-        return f"its entry 'certificate' is none of {', '.join(kinds)}"
+        return f"its entry 'certificate' is not one of {', '.join(kinds)}"
     parts = data.get("checkable") if data["certificate"] == "diagram" else [data]
     formats = {str(part.get("format")) for part in parts or () if isinstance(part, dict)}
     if formats - {str(FORMAT)}:

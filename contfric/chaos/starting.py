@@ -97,7 +97,7 @@ def bounding(tables, mode, on):  # type: ignore[no-untyped-def]
 
 @helper
 def mode_of_signs(functions, tables, starting, code, t, y, p, workspace):  # type: ignore[no-untyped-def]
-    """Return (mode, surfaces that it leaves as bits) by the exact signs; (-1, 0) if there is none.
+    """Return (mode, surfaces that it leaves as bits) by the exact signs; (-1, 0) without one.
 
     A state on surfaces that the signs alone do not decide goes to the side that its rates lead to.
     """

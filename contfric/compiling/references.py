@@ -33,7 +33,7 @@ class Reference(types.Type):  # type: ignore[misc]
         super().__init__(f"Reference({target})")
 
     def type_of(self, name: str) -> Any:
-        """Return the type of a member, None if there is none of that name."""
+        """Return the type of a member, None where no member has that name."""
         if name not in self.target.fields:
             return None
         kind = self.target.types[self.target.fields.index(name)]

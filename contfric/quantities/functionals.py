@@ -1,7 +1,7 @@
 r"""Functionals of an orbit: integrals, means, extrema and harmonics of a function of time.
 
 With T the period of the orbit and :math:`\omega` the frequency of the excitation (of the orbit itself
-where there is none),
+without excitation),
 
 .. math:: \bar g = \frac1T\int_0^T g\,dt, \quad \mathrm{rms} = \Bigl(\frac1T\int_0^T g^2 dt\Bigr)^{1/2}, \quad
    A_k e^{i\varphi_k} = \frac2T\int_0^T g\,e^{-ik\omega t} dt ,

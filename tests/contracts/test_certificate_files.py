@@ -247,7 +247,7 @@ NONE = {
     b"[1, 2]": "it is a JSON file without the entry 'certificate'",
     b'"certificate"': "it is a JSON file without the entry 'certificate'",
     b'{"study": "fig05", "seconds": 2.1}': "it is a JSON file without the entry 'certificate'",
-    b'{"certificate": ["orbit"]}': "its entry 'certificate' is none of event, orbit, tube, diagram",
+    b'{"certificate": ["orbit"]}': "its entry 'certificate' is not one of event, orbit, tube, diagram",
     b'{"certificate": "tube", "format": 2}': "it has format 2, and format 3 is checked; write it anew",
     b'{"certificate": "diagram", "checkable": [{"format": 1}]}': "format 1, and format 3 is checked",
 }

@@ -26,7 +26,7 @@ def changes_much(near, f0, f1, f2):  # type: ignore[no-untyped-def]
 
 @helper
 def earlier_of(at, share):  # type: ignore[no-untyped-def]
-    """Return the smaller of two shares of a step; 0 means that there is none."""
+    """Return the smaller of two shares of a step; 0 stands for none."""
     return share if share > 0.0 and (at == 0.0 or share < at) else at
 
 

@@ -178,7 +178,7 @@ def follow_border(border, workspace):  # type: ignore[no-untyped-def]
 
 @helper
 def bend_value(way, z):  # type: ignore[no-untyped-def]
-    """Return the coefficient or rate whose zero is a point of codimension two; 1 if there is none."""
+    """Return the coefficient or rate whose zero is a point of codimension two; else 1."""
     condition, layout, workspace = way.condition, way.layout, way.workspace
     if condition.kind == SPECTRAL and condition.sign < 0.0:
         return cubic_coefficient(way, z)

@@ -9,8 +9,9 @@ EXIT        rate of the exit's observable at the end of a segment: a tangential 
 INTERIOR    value of a stationary point inside a segment, less the level (AS, GS, T)
 SPECTRAL    the bordered function of the chain's Jacobian (SN, BP, PD), in
             :mod:`contfric.curves.equations.bordered`
-QUANTITY    what is asked of a quantity (:mod:`contfric.curves.equations.held_conditions`); there may be
-several ==========  ==================================================================================
+QUANTITY    what is asked of a quantity; there may be several
+            (:mod:`contfric.curves.equations.held_conditions`)
+==========  ==================================================================================
 
 At a stationary point the derivative with respect to its time is zero, so the gradient of its value is
 that of the state at a fixed time after the start. All gradients are exact; after a reset they follow by the

@@ -218,7 +218,7 @@ def _as_orbit(
 
 
 class Leaving(NamedTuple):
-    """How joints and the parameter move; ``why`` there is no such orbit, if there is none."""
+    """How joints and the parameter move; else ``why`` no such orbit exists."""
 
     joints: FloatArray
     share: float

@@ -123,7 +123,7 @@ def leaving(left, on):  # type: ignore[no-untyped-def]
 def first_hit(motion, mode, c, target, on, t0, y0, dt_max, p, workspace, y1):  # type: ignore[no-untyped-def]
     """Return the first time at which an observable takes a value, with the state there in ``y1``.
 
-    Negative if there is none before ``dt_max``. Where the integration breaks down, the time it came to
+    Negative without one before ``dt_max``. Where the integration breaks down, the time it came to
     with a state that is no number.
     """
     n = y0.shape[0]
