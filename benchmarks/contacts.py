@@ -130,17 +130,16 @@ def main() -> None:
             "{loose} | {modes} | {reached} |".format(**found)
         )
     says = (
-        f"Written by `make bench` (`benchmarks/contacts.py`): {origin()}. "
-        f"{MASSES} masses on springs of their own (1) and between "
-        f"neighbours ({COUPLING}), damping {DAMPING} K, a force cos(Omega t) on the first; friction S = "
-        f"{KINETIC} of some masses against the ground. Seconds of the processor: load, first orbit "
-        f"(simulated), and the response curve over Omega in [{RANGE[0]}, {RANGE[1]}], from near the peak "
-        "down, with multipliers and admissibility at every point, every event located and followed. No "
-        "mode is given: those that were visited are counted (59049 can be). Below 0.9977 the orbits of ten "
-        "contacts lose their stability (NS). Last rows: masses, springs and friction drawn at random, over "
-        f"{100 * WIDTH:.0f} % to either side of the lowest natural frequency. Where an end of the range is "
-        "not reached, the last column says at which value the last branch ended, and why (SHAKEDOWN: beyond "
-        "it a stuck contact slips to one side until it sticks at another position)."
+        f"Written by `make bench` (`benchmarks/contacts.py`): {origin()}. {MASSES} masses on springs of "
+        f"their own (1) and between neighbours ({COUPLING}), damping {DAMPING} K, a force cos(Omega t) on "
+        f"the first; friction S = {KINETIC} of some masses against the ground. Seconds of the processor: "
+        f"load, first orbit (simulated), and the response curve over Omega in [{RANGE[0]}, {RANGE[1]}], "
+        "from near the peak down, with multipliers and admissibility at every point, every event located "
+        "and followed. No mode is given: those that were visited are counted (59049 can be). Below 0.9977 "
+        "the orbits of ten contacts lose their stability (NS). Last rows: masses, springs and friction "
+        f"drawn at random, over {100 * WIDTH:.0f} % to either side of the lowest natural frequency. Where "
+        "an end of the range is not reached, the last column says at which value the last branch ended, and "
+        "why (SHAKEDOWN: beyond it a stuck contact slips to one side until it sticks at another position)."
     )
     head = (
         "| contacts | load | first orbit | its segments | curve | points | events | loose ends | modes "

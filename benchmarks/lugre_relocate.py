@@ -20,7 +20,6 @@ import numpy as np
 
 import contfric as cf
 from contfric.bvp.system import build_system
-from contfric.models.reading.describe import from_text
 from contfric.models.reading.files import model_of
 from contfric.orbit.solve import refine
 
@@ -45,7 +44,7 @@ class Place:
 
 def with_tolerance(model: cf.Model, tolerance: float) -> cf.Model:
     """Return a declared model that is integrated to another tolerance."""
-    return model_of(replace(from_text(model.definition), tolerance=tolerance).text)
+    return model_of(replace(model.description, tolerance=tolerance).text)
 
 
 def moved_cut(orbit: cf.Orbit, model: cf.Model, phase: float) -> cf.Orbit:

@@ -152,9 +152,8 @@ def estimates(rounds: int) -> list[str]:
             )
         apart = abs(exact.largest - rough.value) / np.hypot(exact.error, rough.error)
         lines.append(
-            f"| {name} | {exact.largest:.5f} | {exact.error:.5f} | {rough.value:.5f} "
-            f"| {rough.error:.5f} | {apart:.1f} | {min(one.busy) * 1e3:.1f} ms "
-            f"| {min(two.busy) * 1e3:.0f} ms |"
+            f"| {name} | {exact.largest:.5f} | {exact.error:.5f} | {rough.value:.5f} | {rough.error:.5f} | "
+            f"{apart:.1f} | {min(one.busy) * 1e3:.1f} ms | {min(two.busy) * 1e3:.0f} ms |"
         )
     return lines
 
@@ -243,10 +242,9 @@ def report(short: bool) -> str:
         parts.append(memory())
     took = time.perf_counter() - began
     head = (
-        f"Written by `make bench` (`benchmarks/lyapunov.py`, which took {took:.0f} s): {origin()}. "
-        f"Medians and minima of {rounds} "
-        "rounds in turns, warm. The plane is that of Fig. 9 of the article (S0 = 0.4, Omega from 0.1 to "
-        "0.6, S from 0 to 0.4), with its initial state."
+        f"Written by `make bench` (`benchmarks/lyapunov.py`, which took {took:.0f} s): {origin()}. Medians "
+        f"and minima of {rounds} rounds in turns, warm. The plane is that of Fig. 9 of the article (S0 = "
+        "0.4, Omega from 0.1 to 0.6, S from 0 to 0.4), with its initial state."
     )
     return "\n\n".join([head, *("\n".join(part) for part in parts)])
 

@@ -94,15 +94,14 @@ def main() -> None:
     lines = [
         HEADING,
         "",
-        f"Written by `make bench` (`benchmarks/six_segments.py`): {origin()}. "
-        "The chain above under F (cos wt + 0.6 cos 3wt) + 0.02, "
-        "its first mass on friction S; orbits of six segments along F, which is in no matrix, and along a "
-        "factor k of the stiffness, with which every matrix is another one at each point. Microseconds "
-        "of the processor for a point: prediction, Newton's method, all margins with their stationary "
-        f"points; and with multipliers. The least of {ROUNDS} branches in turns with a yardstick (200,000 "
-        "numbers sorted, milliseconds), all that a call costs divided by its points. Beyond six "
-        "states most of each solution is kept from point to point (docs/integration.md), which is part of "
-        "the time of the first points.",
+        f"Written by `make bench` (`benchmarks/six_segments.py`): {origin()}. The chain above under F (cos "
+        "wt + 0.6 cos 3wt) + 0.02, its first mass on friction S; orbits of six segments along F, which is "
+        "in no matrix, and along a factor k of the stiffness, with which every matrix is another one at "
+        "each point. Microseconds of the processor for a point: prediction, Newton's method, all margins "
+        f"with their stationary points; and with multipliers. The least of {ROUNDS} branches in turns with "
+        "a yardstick (200,000 numbers sorted, milliseconds), all that a call costs divided by its points. "
+        "Beyond six states most of each solution is kept from point to point (docs/integration.md), which "
+        "is part of the time of the first points.",
         "",
         "| states | points | a point | with multipliers | along k | with multipliers | yardstick |",
         "|---|---|---|---|---|---|---|",

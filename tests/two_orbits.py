@@ -22,7 +22,7 @@ from contfric.base.arrays import FloatArray
 from contfric.errors import ContfricError
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.simulation.simulate import SimulationEnd, run, simulate
 
 #: Instants of comparison in a period of the excitation.

@@ -62,10 +62,9 @@ those with too many branches, too). The tables show how many there are.
 #: What each run looks at, for readers who do not know its code.
 EXPLANATIONS = {
     "sequences": (
-        "A mass is simulated for many periods. Each slide, stick, stop and release must happen in the "
-        "right order, at the right time and place. *Undecidable* cases are left out: rounding of the "
-        "input alone decides what happens next. *sigma* is the error that rounding is expected to "
-        "cause."
+        "A mass is simulated for many periods. Each slide, stick, stop and release must happen in the right "
+        "order, at the right time and place. *Undecidable* cases are left out: rounding of the input alone "
+        "decides what happens next. *sigma* is the error that rounding is expected to cause."
     ),
     "segments": (
         "One segment of motion at a time: where does it end, and how does the end depend on the start "

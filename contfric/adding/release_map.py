@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.bvp.prescribed_outcomes import follow_itinerary
 from contfric.continuation.branch import Branch
 from contfric.orbit.orbit import Orbit
@@ -194,8 +194,8 @@ class _Release:
     def _start(self, letter: str, value: float, time: float) -> Orbit:
         """Return a letter with its first joint the release at a time."""
         orbit = self.letters[letter]
-        model, vector, joints = orbit.model, orbit.vector.copy(), orbit.joints.copy()
-        vector[model.index_of(self.bridge.parameter)] = value
+        model, joints = orbit.model, orbit.joints.copy()
+        vector = with_entries(orbit.vector, model.index_of(self.bridge.parameter), value)
         view, state, on = model.view(vector), joints[0, 1:], self.surfaces
         assert on is not None
         joints[0, 0] = time

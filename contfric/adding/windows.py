@@ -24,7 +24,7 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.adding.two_orbit_itineraries import itineraries_with_ranges
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.renamed import renamed
 from contfric.base.shown import Shown
 from contfric.bvp.prescribed_outcomes import follow_itinerary
@@ -230,8 +230,7 @@ def _at(orbit: Orbit, parameter: str, value: float) -> Orbit:
     Newton alone may take the wrong root where a stick of a turn is short: its load falls through the
     limit before it grows through it. So the joints are first those of the solution itself.
     """
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(parameter)] = value
+    vector = with_entries(orbit.vector, orbit.model.index_of(parameter), value)
     return refine(_with_own_joints(replace(orbit, vector=vector)))
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contfric.atlas.matching import guesses
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.continuation.branch import Branch
 from contfric.orbit.canonical.slides import modulo
 from contfric.orbit.orbit import Orbit
@@ -87,8 +87,7 @@ def _orbits_at(branches: Iterable[Branch], value: float) -> list[Orbit]:
     """Return the orbits of branches at a value of their parameter."""
     found = []
     for branch in branches:
-        vector = branch[0].vector.copy()
-        vector[branch.model.index_of(branch.parameter)] = value
+        vector = with_entries(branch[0].vector, branch.model.index_of(branch.parameter), value)
         for _, guess in guesses(branch, vector, value):
             solved = refine(replace(guess, vector=vector), damped=False)
             if solved.converged:

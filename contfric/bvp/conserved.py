@@ -19,8 +19,8 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.definition import Model
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.described.evaluate import Sampler, defaults, floats
-from contfric.models.growing_model import ComposedModel
 
 Itinerary = tuple[tuple[str, str], ...]
 #: Parameters, time, state and rate.
@@ -84,9 +84,8 @@ def _kept(still: FloatArray, changes: FloatArray) -> FloatArray:
 
 @cache
 def _samplers(model: Model) -> tuple[Sampler, Sampler]:
-    from contfric.models.reading.describe import from_text
 
-    description = from_text(model.definition)
+    description = model.description
     params = defaults(description)
     moved = {name: value * _MOVED for name, value in params.items()}
     evaluator = floats(description)

@@ -26,7 +26,7 @@ from contfric.censuses.sections import Section, exit_arcs, period_of, sections_o
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show

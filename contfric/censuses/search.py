@@ -133,8 +133,7 @@ class Search:
         if self.progress is not None:
             found = len(self.catalogue)
             self.progress(
-                f"{self.grid.section}: {count} cells of 2^-{level}, {self.grid.count} starts, "
-                f"{found} orbits"
+                f"{self.grid.section}: {count} cells of 2^-{level}, {self.grid.count} starts, {found} orbits"
             )
 
     def _first_cells(self) -> IntArray:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 from contfric.base.extras import need_flint
 from contfric.errors import ParameterError
 from contfric.models import ModelSource, Parameters
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 
 if TYPE_CHECKING:
     from contfric.certify.census_result import CensusCertificate

@@ -21,7 +21,7 @@ from contfric.chaos.work import Work, put_rows
 from contfric.errors import ParameterError, function_of, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.simulation.excitation import check_excitation
 from contfric.simulation.time_scale import has_clock

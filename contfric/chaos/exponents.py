@@ -15,7 +15,7 @@ from contfric.chaos.status import Motion
 from contfric.errors import ParameterError, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.simulation.excitation import check_excitation
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.base.attributes import altered
 from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
@@ -106,8 +106,7 @@ class Branch(Shown):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         index = operator.index(index)
-        vector = self.vector.copy()
-        vector[self.model.index_of(self.parameter)] = self.values[index]
+        vector = with_entries(self.vector, self.model.index_of(self.parameter), self.values[index])
         return Orbit(self.system, self.joints[index], vector, 0.0)
 
     @cached_property

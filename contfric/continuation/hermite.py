@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.interrupts import whole
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
@@ -39,8 +39,7 @@ def point_between(
 ) -> Point | None:
     """Return the solved point at a share of a step, normal to the tangent there; None if it fails."""
     joints, w, tangent, direction = cubic_between(before, after, share)
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = w[0]
+    vector = with_entries(orbit.vector, orbit.model.index_of(settings.parameter), w[0])
     guess = Orbit(orbit.system, joints, vector, np.inf)
     found = first_point(guess, settings, tangent, float(direction[0]))
     arc = before.arc + share * (after.arc - before.arc)

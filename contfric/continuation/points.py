@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.base.attributes import altered
 from contfric.bvp.system import System
 from contfric.errors import (
@@ -152,8 +152,7 @@ class Point:
         last: tuple[tuple[object, ...], Orbit] | None = own.get("_orbit")
         if last is not None and all(map(operator.is_, asked, last[0])):
             return last[1]
-        full = of.vector.copy()
-        full[active] = self.w[0]
+        full = with_entries(of.vector, active, self.w[0])
         found = Orbit(of.system, self.joints.copy(), full, 0.0)
         own["_orbit"] = asked, found
         return found

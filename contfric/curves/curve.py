@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.base.tabled import as_table
@@ -143,8 +143,11 @@ class Curve(Shown):
             index += len(self)
         for part in self.parts:
             if 0 <= index < len(part):
-                vector = self.vector.copy()
-                vector[[self.model.index_of(n) for n in self.parameters]] = part.values[index]
+                vector = with_entries(
+                    self.vector,
+                    [self.model.index_of(n) for n in self.parameters],
+                    part.values[index],
+                )
                 return Orbit(part.system, part.joints[index], vector, 0.0)
             index -= len(part)
         raise IndexError(f"a curve of {len(self)} points has no such point")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.base.pace import Pace
 from contfric.base.tally import tally
 from contfric.bvp.linear import assembled
@@ -182,8 +182,7 @@ def _passes(problem: Conditioned, start: Point, before: Point, after: Point, nea
 
 
 def _period(problem: Conditioned, point: Point) -> float:
-    vector = problem.vector.copy()
-    vector[problem.which] = point.w
+    vector = with_entries(problem.vector, problem.which, point.w)
     return float(problem.system.model.view(vector).period)
 
 

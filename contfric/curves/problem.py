@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.bvp.linear import jacobian_blocks, stacked
 from contfric.bvp.system import EventFunction, Margin, System
 from contfric.curves.ranges import PlaneRanges, limits_of
@@ -93,9 +93,7 @@ class Problem:
 
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""
-        vector = self.vector.copy()
-        vector[self.which] = w
-        return Orbit(self.system, joints.copy(), vector, 0.0)
+        return Orbit(self.system, joints.copy(), with_entries(self.vector, self.which, w), 0.0)
 
 
 def problem_of(bifurcation: Bifurcation, box: PlaneRanges) -> Problem:

@@ -32,7 +32,7 @@ from contfric.errors import (
 )
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.quantities.registry import QuantityLike, number_quantity
 from contfric.remember.folder import kept_in
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.named import Named
 from contfric.base.tabled import Columns, Tabled
 from contfric.equilibria.events import EquilibriumEvent
@@ -80,8 +80,7 @@ class EquilibriumBranch(Tabled):
         return len(self.values)
 
     def __getitem__(self, index: int) -> Equilibrium:
-        vector = self.vector.copy()
-        vector[self.model.index_of(self.parameter)] = self.values[index]
+        vector = with_entries(self.vector, self.model.index_of(self.parameter), self.values[index])
         own = self.eigenvalues[index]
         known = own[~np.isnan(own.real)]
         return equilibrium_at(self.regions[index], self.states[index], vector, known)

@@ -208,8 +208,7 @@ def cycle_of_boundary(event: BoundaryPoint, distance: float | None = None) -> Or
                 return far
     raise ConvergenceError(
         f"{event!r}: no attracting cycle was found that shrinks to the equilibrium with the distance from "
-        "the event "
-        f"({apart:.3g}); try another distance=..."
+        f"the event ({apart:.3g}); try another distance=..."
     )
 
 

@@ -21,7 +21,7 @@ from contfric.equilibria.trace import continue_equilibrium
 from contfric.errors import checked_range, function_of, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 
 if TYPE_CHECKING:
     import pandas as pd

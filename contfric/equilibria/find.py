@@ -25,7 +25,7 @@ from contfric.equilibria.result import (
 from contfric.errors import whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 
 #: Two zeros nearer than this, in natural sizes of the states, are one.
 _SAME = 1e-7

@@ -165,14 +165,13 @@ def regions_of(model: Model) -> tuple[ModeRegion, ...]:
 
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.numbers import function_of_numbers
-    from contfric.models.reading.describe import from_text
 
     if not model.definition:
         raise ParameterError(
             f"equilibria of '{model.name}' are found from its formulas, and it is not declared by formulas: "
             "write it as a YAML file or a class"
         )
-    description = from_text(model.definition)
+    description = model.description
     formulas = Formulas(description)
     still = {formulas.t: sympy.Integer(0)}
     heights_of, seen = formulas.heights(), (o.name for o in description.observables)
@@ -217,9 +216,8 @@ def check_no_excitation(model: Model, params: Mapping[str, float], active: str =
     if model.autonomous or not model.definition:
         return
     from contfric.models.generated.symbols import Formulas
-    from contfric.models.reading.describe import from_text
 
-    formulas = Formulas(from_text(model.definition))
+    formulas = Formulas(model.description)
     known = {
         symbol: params[p.name]
         for symbol, p in zip(formulas.p, formulas.description.parameters, strict=True)

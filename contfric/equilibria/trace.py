@@ -77,8 +77,7 @@ def continue_equilibrium(
     if equilibrium.location is Location.BOUNDARY:
         raise ParameterError(
             "the equilibrium lies on the boundary of its region: move a parameter a little, find it again, "
-            "and "
-            "continue from there"
+            "and continue from there"
         )
     check_no_excitation(model, equilibrium.params, parameter)
     step = _MAX_STEP if max_step is None else real_number("max_step", max_step, least=1e-9)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.interrupts import whole
 from contfric.equilibria.regions import ModeRegion
 
@@ -69,9 +69,7 @@ class Arc:
 
     def parameters(self, x: FloatArray) -> FloatArray:
         """Return all parameters of a point."""
-        found = self.vector.copy()
-        found[self.active] = self.parameter(x)
-        return found
+        return with_entries(self.vector, self.active, self.parameter(x))
 
     def at(self, point: CurvePoint) -> tuple[FloatArray, FloatArray]:
         """Return state and parameters of a point of the curve."""

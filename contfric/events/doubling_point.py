@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.attributes import altered
 from contfric.bvp.linear import equations_at, pencil_of_turn, tangent_of
 from contfric.orbit.orbit import Orbit, Status
@@ -206,9 +206,7 @@ def _by_secants(
 
 def moved(orbit: Orbit, active: int, value: float) -> Orbit:
     """Return an orbit solved at another value of a parameter; its status says whether it is."""
-    vector = orbit.vector.copy()
-    vector[active] = value
-    return refine(altered(orbit, vector=vector), damped=False)
+    return refine(altered(orbit, vector=with_entries(orbit.vector, active, value)), damped=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,6 +266,5 @@ class Line:
         return None
 
     def _split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        vector = self.orbit.vector.copy()
-        vector[self.active] = x[-1]
-        return x[:-1].reshape(self.orbit.joints.shape), vector
+        joints = x[:-1].reshape(self.orbit.joints.shape)
+        return joints, with_entries(self.orbit.vector, self.active, x[-1])

@@ -55,6 +55,7 @@ from contfric.remember.stored import given, made_of
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
     from contfric.models.balls.model import BallModel
+    from contfric.models.described.description import Description
     from contfric.models.view import FlowView
 
 __all__ = [
@@ -185,17 +186,23 @@ class Model(Shown, TransitionMaps):
                 )
 
     @cached_property
+    def description(self) -> Description:
+        """The declaration as plain data (of a model that is declared by its equations)."""
+        from contfric.models.described.reading_back import from_text
+
+        return from_text(self.definition)
+
+    @cached_property
     def integrated(self) -> dict[str, str]:
         """Modes that are integrated numerically, and why (of a model that is declared by its equations)."""
         if not self.definition:
             return {}
         from contfric.models.generated.formula_tables import forms_of
         from contfric.models.generated.symbols import integrated_modes
-        from contfric.models.reading.describe import from_text
 
         if forms_of(self.definition) is not None:
             return {}
-        found = integrated_modes(from_text(self.definition))
+        found = integrated_modes(self.description)
         return {mode: why for mode, why in found.items() if mode not in self.phase_parts}
 
     @property

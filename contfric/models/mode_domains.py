@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from functools import cache
 
 from contfric.models.definition import Model
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.described.regions import is_possible
-from contfric.models.growing_model import ComposedModel
 from contfric.models.lazy_mapping import Made
 
 

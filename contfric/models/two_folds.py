@@ -29,20 +29,22 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.base.shown import Shown
 from contfric.errors import ParameterError, whole_number
-from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Domain, Model
 from contfric.models.described.description import Description
 from contfric.models.generated.symbols import Formulas
 from contfric.models.language.formulas import vanishes
 from contfric.models.language.numbers import function_of_numbers
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
+
+if TYPE_CHECKING:
+    from contfric.models import ModelSource, Parameters
 
 #: Newton's method: steps, and what is short, relative to the natural sizes.
 _STEPS, _SHORT = 60, 1e-12
@@ -200,9 +202,7 @@ class _Tangencies:
         cls, model: Model, vector: FloatArray, surface: str, above: str, below: str
     ) -> _Tangencies:
         """Derive them from the formulas of a model."""
-        from contfric.models.reading.describe import from_text
-
-        description = from_text(model.definition)
+        description = model.description
         formulas, fields = _formulas(description)
         names = [mode.name for mode in description.modes]
         height = formulas.heights()[surface]

@@ -14,7 +14,7 @@ from contfric.bvp.conserved import conserved
 from contfric.bvp.system import System, build_system
 from contfric.errors import ConvergenceError, ParameterError, function_of, whole_number
 from contfric.models import ModelSource, Parameters
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.orbit.canonical.sections import has_sections, named_by_ends
 from contfric.orbit.clock import clocked
 from contfric.orbit.itinerary.itineraries import half_of

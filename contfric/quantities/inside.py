@@ -13,7 +13,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models.definition import Model
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.language.grammar import PI, TIME, Scope, names_in, parse
 from contfric.models.language.quantity_texts import FORCE_OF, WORK, Functional, no_contact
 from contfric.quantities.duals import Dual, Kinks, constant
@@ -169,9 +169,8 @@ def definitions_of(model: Model) -> Mapping[str, ast.expr]:
     """Return the named expressions of a model that is declared by its equations; empty of another one."""
     if not model.definition:
         return {}
-    from contfric.models.reading.describe import from_text
 
-    parts = from_text(model.definition).names.parts
+    parts = model.description.names.parts
     return {name: parse(text) for name, text in parts.items()}
 
 
@@ -186,9 +185,8 @@ def laws_of(model: Model) -> tuple[ContactLaws, ...]:
         return ()
     if isinstance(model, ComposedModel):
         return model.composition.laws
-    from contfric.models.reading.describe import from_text
 
-    return from_text(model.definition).laws
+    return model.description.laws
 
 
 def _leaves(tree: ast.expr, definitions: Mapping[str, ast.expr]) -> set[str]:

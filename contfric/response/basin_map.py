@@ -29,7 +29,7 @@ from contfric.errors import (
 )
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.response.attractors import Attractors, given_orbits
 from contfric.response.basin_tile import BasinRows, BasinTile, compute_basin_tile

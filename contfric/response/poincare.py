@@ -12,7 +12,7 @@ from contfric.errors import (
 )
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following, SectionPoints
 from contfric.response.outcome import Outcome

@@ -19,7 +19,7 @@ from contfric.chaos.work import TileTask, Work, put_rows
 from contfric.errors import function_of, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.response.collecting import collect, repeats_of
 from contfric.response.cuts import Following

@@ -23,7 +23,7 @@ from contfric.chaos.work import TileTask
 from contfric.errors import ParameterError, function_of, real_number, shown, truth
 from contfric.models import ModelSource
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.remember.journal import Parts
 from contfric.response.collecting import collect, repeats_of

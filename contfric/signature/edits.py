@@ -22,7 +22,7 @@ from functools import cache
 
 from contfric.errors import NotationError, did_you_mean
 from contfric.models import Model
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.signature.holds import is_hold, without_holds
 from contfric.signature.reduced import NEVER, ReducedItinerary, ReducedPair, fuses
 

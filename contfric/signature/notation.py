@@ -343,10 +343,7 @@ def _impossible(model: Model, segments: Sequence[str], index: int, following: in
             f"the walk is not closed: the last segment {index + 1} '{first}' cannot lead back "
             f"to the first, '{second}'. {advice}"
         )
-    return (
-        f"segment {index + 1} '{first}' cannot be followed by segment {following + 1} "
-        f"'{second}'. {advice}"
-    )
+    return f"segment {index + 1} '{first}' cannot be followed by segment {following + 1} '{second}'. {advice}"
 
 
 def _mirrored(model: Model, segments: Iterable[str]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.definition import Domain, Model, Surface
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
 from contfric.models.view import FlowView
 from contfric.simulation.time_scale import clock_period, time_scale

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.deriving.visited_modes import Way
-from contfric.models.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
 from contfric.simulation.tables import (
     SOLVED,

@@ -20,8 +20,8 @@ from contfric.base.tally import tally
 from contfric.errors import function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.growing_model import ComposedModel
-from contfric.models.shorthand.tied import tied
+from contfric.models.deriving.growing_model import ComposedModel
+from contfric.models.tied import tied
 from contfric.simulation.dense import sample, table
 from contfric.simulation.starts import checked_state, left_through, start_of
 from contfric.simulation.tables import SOLVED, surfaces_under, tables

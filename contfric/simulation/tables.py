@@ -17,7 +17,7 @@ import numpy as np
 from contfric.base.arrays import IntArray
 from contfric.errors import ModelError, ParameterError
 from contfric.models.definition import Domain, Mode, Model, Surface
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
 from contfric.models.parts import MOST_SURFACES
 

@@ -14,7 +14,7 @@ from contfric.errors import NotationError, ParameterError, StudyError, did_you_m
 from contfric.models import load_model
 from contfric.models.definition import Model
 from contfric.models.paths import relative_name
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.orbit.orbit import Orbit
 from contfric.quantities.registry import number_quantity, quantity_names
 from contfric.signature import Signature, load_signature

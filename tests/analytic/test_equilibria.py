@@ -66,10 +66,8 @@ modes:
 def smooth(name: str, states: str, parameters: str, section: str, field: str) -> cf.Model:
     """A smooth model with a section, so that its cycles are orbits."""
     return typed(
-        f"name: {name}\nstates: [{states}]\nparameters: {{{parameters}}}\n"
-        f"observables: {{cut: {section}}}\n"
-        "surfaces: {cut: {observable: cut, level: 0}}\n"
-        f"field: {{{field}}}\n"
+        f"name: {name}\nstates: [{states}]\nparameters: {{{parameters}}}\nobservables: {{cut: "
+        f"{section}}}\nsurfaces: {{cut: {{observable: cut, level: 0}}}}\nfield: {{{field}}}\n"
         'modes: {up: {in: {cut: "+"}}, down: {in: {cut: "-"}}}\n'
     )
 

@@ -290,10 +290,9 @@ def test_a_pendulum_rotates_and_oscillates() -> None:
 def test_derived_sliding_is_that_of_dry_friction(tmp_path) -> None:
     path = tmp_path / "derived.yaml"
     path.write_text(
-        "name: derived\nstates: [x, v]\nparameters: {Omega: 0.47, S: 0.3}\nperiod: 2*pi/Omega\n"
-        "surfaces: {v: {observable: v, sliding: filippov}}\n"
-        "field: {x: v, v: cos(Omega*t) - x - S*sign(v)}\n"
-        "modes: {forward: {in: {v: +}}, backward: {in: {v: -}}}\nspread: {x: 2, v: 1}\n",
+        "name: derived\nstates: [x, v]\nparameters: {Omega: 0.47, S: 0.3}\nperiod: 2*pi/Omega\nsurfaces: "
+        "{v: {observable: v, sliding: filippov}}\nfield: {x: v, v: cos(Omega*t) - x - S*sign(v)}\nmodes: "
+        "{forward: {in: {v: +}}, backward: {in: {v: -}}}\nspread: {x: 2, v: 1}\n",
         encoding="utf-8",
     )
     for S in (0.2, 0.3, 0.4):

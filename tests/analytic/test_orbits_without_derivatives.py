@@ -12,7 +12,6 @@ import pytest
 
 import contfric as cf
 from contfric.models.described.evaluate import floats
-from contfric.models.reading.describe import from_text
 
 #: What is followed of each structure: a parameter, its range, and where an orbit is looked for.
 STRUCTURES: dict[str, tuple[str, tuple[float, float], dict[str, float]]] = {
@@ -54,7 +53,7 @@ def exponential(orbit: cf.Orbit, i: int) -> np.ndarray:
 
     With ``y' = A y + c + a cos(w t) + b sin(w t)`` the vector (y, 1, cos, sin) has linear rates.
     """
-    fields, n = floats(from_text(orbit.model.definition)), len(orbit.model.states)
+    fields, n = floats(orbit.model.description), len(orbit.model.states)
     mode, _ = orbit.itinerary[i]
     period = orbit.flow.period
 

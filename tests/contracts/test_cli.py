@@ -333,9 +333,8 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 def test_explain_imports_nothing_heavy() -> None:
     before = (
-        "import atexit\n"
-        "heavy = ('numba', 'matplotlib', 'networkx', 'scipy', 'pandas')\n"
-        "atexit.register(lambda: print(*[m for m in heavy if m in sys.modules], file=sys.stderr))"
+        "import atexit\nheavy = ('numba', 'matplotlib', 'networkx', 'scipy', "
+        "'pandas')\natexit.register(lambda: print(*[m for m in heavy if m in sys.modules], file=sys.stderr))"
     )
     code, out, err = finish(command("explain", "fig05", before=before))
     assert (code, err.split()) == (0, [])
@@ -344,11 +343,10 @@ def test_explain_imports_nothing_heavy() -> None:
 
 def test_a_run_loads_what_its_study_asks_for(study, tmp_path: Path) -> None:
     before = (
-        "import atexit\n"
-        "other = ('matplotlib', 'concurrent.futures.process', 'contfric.chaos.map',\n"
-        "  'contfric.ensembles.ensemble', 'contfric.equilibria.explore', 'contfric.fitting.result',\n"
-        "  'contfric.response.sweep', 'contfric.curves.curve')\n"
-        "atexit.register(lambda: print(*[m for m in other if m in sys.modules], file=sys.stderr))"
+        "import atexit\nother = ('matplotlib', 'concurrent.futures.process', 'contfric.chaos.map',\n  "
+        "'contfric.ensembles.ensemble', 'contfric.equilibria.explore', 'contfric.fitting.result',\n  "
+        "'contfric.response.sweep', 'contfric.curves.curve')\natexit.register(lambda: print(*[m for m in "
+        "other if m in sys.modules], file=sys.stderr))"
     )
     options = ("run", study(HEAD + EXPLORE), "--out", tmp_path / "out", "--quiet")
     code, _, err = finish(command(*options, before=before))

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from contfric.base.resources import bundled_dir
+from contfric.models.check.probe import field_of
 from contfric.models.deriving import sections
 from contfric.models.generated import build, symbols
 from contfric.models.library import bundled, find
@@ -107,7 +108,7 @@ def test_a_model_has_one_module(fresh_cache, name):
     model = read(name)
     flow = model.flow_factory
     assert flow.definition != model.definition
-    assert build.field_of(model) is build.load_module(flow.definition).field_of
+    assert field_of(model) is build.load_module(flow.definition).field_of
     assert len(list(fresh_cache.rglob("contfric_model_*.py"))) == 1
 
 

@@ -580,13 +580,10 @@ def test_what_the_user_asks_matplotlib_for_is_saved(branch: Any, tmp_path: Path)
 
 def test_saving_needs_no_pyplot() -> None:
     code = (
-        "import sys, io, contfric as cf, contfric.plot\n"
-        "assert 'matplotlib' not in sys.modules, 'contfric.plot loads matplotlib at once'\n"
-        "from contfric.plot import new_figure, plot_transition_graph\n"
-        "fig = new_figure()\n"
-        "plot_transition_graph(cf.load_model('coulomb'), fig.add_subplot())\n"
-        "fig.savefig(io.BytesIO())\n"
-        "assert 'matplotlib.pyplot' not in sys.modules\n"
+        "import sys, io, contfric as cf, contfric.plot\nassert 'matplotlib' not in sys.modules, "
+        "'contfric.plot loads matplotlib at once'\nfrom contfric.plot import new_figure, "
+        "plot_transition_graph\nfig = new_figure()\nplot_transition_graph(cf.load_model('coulomb'), "
+        "fig.add_subplot())\nfig.savefig(io.BytesIO())\nassert 'matplotlib.pyplot' not in sys.modules\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

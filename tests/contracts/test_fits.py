@@ -257,10 +257,9 @@ def test_curves_of_quantities_in_studies(write, tmp_path: Path, orbit: cf.Orbit)
     ranges = {"Omega": (0.48, 0.55), "S": (0.25, 0.35)}
     where = "parameters: [Omega, S], range: {Omega: [0.48, 0.55], S: [0.25, 0.35]}, max_step: 0.1"
     path = write(
-        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: {signature: 1a}\n"
-        f"hold: {{quantity: x_max, value: 1.43, {where}}}\n"
-        f"extremum: {{quantity: x_max, {where}}}\n"
-        "figures: [{kind: hold}, {kind: extremum}]\n"
+        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: {signature: 1a}\nhold: {quantity: "
+        f"x_max, value: 1.43, {where}}}\nextremum: {{quantity: x_max, {where}}}\nfigures: [{{kind: hold}}, "
+        "{kind: extremum}]\n"
     )
     run = cf.run_study(path, out=tmp_path / "run")
     curve = cf.continue_quantity(orbit, "x_max", 1.43, ("Omega", "S"), ranges, max_step=0.1)
@@ -274,10 +273,9 @@ def test_curves_of_quantities_in_studies(write, tmp_path: Path, orbit: cf.Orbit)
 
 def test_a_stable_set_in_a_study(write, tmp_path: Path) -> None:
     path = write(
-        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: {signature: 2s}\n"
-        "basins: {grid: {x: [-2, 2, 6], v: [-1, 1, 6]}}\n"
-        "stable_set: {range: {x: [-2, 2], v: [-1, 1]}, max_step: 0.1}\n"
-        "figures: [{kind: stable_set}]\n"
+        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: {signature: 2s}\nbasins: {grid: {x: "
+        "[-2, 2, 6], v: [-1, 1, 6]}}\nstable_set: {range: {x: [-2, 2], v: [-1, 1]}, max_step: "
+        "0.1}\nfigures: [{kind: stable_set}]\n"
     )
     cf.run_study(path, out=tmp_path / "run")
     saddle = cf.solve_orbit("coulomb", "2s", TRUE)

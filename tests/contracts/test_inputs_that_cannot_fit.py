@@ -186,10 +186,9 @@ def test_files_that_are_no_text_of_a_few_pages(bomb: str, tmp_path: Path) -> Non
 
 def test_aliases_that_repeat_little_are_read(tmp_path: Path) -> None:
     text = (
-        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: simulate\n"
-        "plane: {parameters: [Omega, S], range: {Omega: &r [0.3, 0.7], S: [0.1, 0.4]}, "
-        "sections: {Omega: *r}}\n"
-        "want: [stability]\nfigures: [{kind: plane}]\n"
+        "model: coulomb\nparams: {Omega: 0.5, S: 0.32, S0: 0.4}\nstart: simulate\nplane: {parameters: "
+        "[Omega, S], range: {Omega: &r [0.3, 0.7], S: [0.1, 0.4]}, sections: {Omega: *r}}\nwant: "
+        "[stability]\nfigures: [{kind: plane}]\n"
     )
     study = read_study(write(tmp_path / "a.yaml", text))
     assert study.content.plane is not None and study.content.plane.sections == {"Omega": [0.3, 0.7]}
@@ -197,9 +196,8 @@ def test_aliases_that_repeat_little_are_read(tmp_path: Path) -> None:
 
 def test_grids_of_a_study_that_do_not_fit(tmp_path: Path) -> None:
     text = (
-        "model: coulomb\nparams: {S0: 0.4}\nstart: simulate\n"
-        "lyapunov: {grid: {Omega: [0.1, 0.7, 1.0e+12], S: [0.0, 0.4, 1.0e+12]}}\n"
-        "want: [stability]\nfigures: [{kind: lyapunov}]\n"
+        "model: coulomb\nparams: {S0: 0.4}\nstart: simulate\nlyapunov: {grid: {Omega: [0.1, 0.7, 1.0e+12], "
+        "S: [0.0, 0.4, 1.0e+12]}}\nwant: [stability]\nfigures: [{kind: lyapunov}]\n"
     )
     path = write(tmp_path / "a.yaml", text)
     assert "GB" in refused(lambda: read_study(path), cf.StudyError)

@@ -173,10 +173,9 @@ page.count("contfric-data")
 def test_a_notebook_serves_it_while_it_goes_on() -> None:
     """In a process of its own: the libraries of notebooks warn of much that is not ours."""
     script = (
-        "import sys, nbformat.v4 as v4; from nbclient import NotebookClient;"
-        "cells = [v4.new_code_cell(text) for text in sys.argv[1].split('---')];"
-        "book = NotebookClient(v4.new_notebook(cells=cells), timeout=300).execute();"
-        "print(*[o['data'] for c in book.cells for o in c['outputs']], sep='\\n')"
+        "import sys, nbformat.v4 as v4; from nbclient import NotebookClient;cells = [v4.new_code_cell(text) "
+        "for text in sys.argv[1].split('---')];book = NotebookClient(v4.new_notebook(cells=cells), "
+        "timeout=300).execute();print(*[o['data'] for c in book.cells for o in c['outputs']], sep='\\n')"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, NOTEBOOK], capture_output=True, text=True, check=False

@@ -131,9 +131,8 @@ def test_flat_surfaces_are_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("also", "ok"), [("", False), (", chatter: true", True)])
 def test_what_stays_at_a_wall_needs_a_mode_there(tmp_path: Path, also: str, ok: bool) -> None:
     ball = (
-        "name: ball\nstates: [y, v]\nparameters: {a: 1.4, w: 0.8}\nperiod: 2*pi/w\n"
-        "surfaces: {table: {observable: y - a*sin(w*t)}}\n"
-        "modes: {flight: {in: {table: +}, field: {y: v, v: -0.7}}}\n"
+        "name: ball\nstates: [y, v]\nparameters: {a: 1.4, w: 0.8}\nperiod: 2*pi/w\nsurfaces: {table: "
+        "{observable: y - a*sin(w*t)}}\nmodes: {flight: {in: {table: +}, field: {y: v, v: -0.7}}}\n"
     )
     report = report_of(tmp_path, f"{ball}resets: {{table: {{v: a*w*cos(w*t){also}}}}}\n")
     assert report.ok == ok, str(report)

@@ -14,7 +14,7 @@ from contfric.base.resources import bundled_dir
 from contfric.continuation.points import LARGEST_STEP
 from contfric.curves.trace import largest_step
 from contfric.events.bifurcation import meaning_of
-from contfric.models.reading.describe import from_text
+from contfric.models.described.reading_back import from_text
 
 GOOD = """\
 name: spring

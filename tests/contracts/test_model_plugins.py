@@ -122,15 +122,13 @@ def in_site(site: Path, code: str) -> subprocess.CompletedProcess[str]:
 def test_another_package_offers_models_and_signatures(site: Path) -> None:
     done = in_site(
         site,
-        "import contfric as cf\n"
-        "print(*[n for n in cf.model_names() if 'plugin' in n or n == 'damped'])\n"
-        "print(cf.load_model('damped').name, cf.load_model('class-of-plugin').modes[3].rank)\n"
-        "signature = cf.load_signature('there-and-back')\n"
-        "print(signature.model is cf.load_model('damped'), cf.signature_names('damped'))\n"
-        "try:\n    cf.load_model('broken-of-plugin')\n"
-        "except cf.ModelError as error:\n    print(error)\n"
-        "try:\n    cf.load_model('dampd')\n"
-        "except cf.ParameterError as error:\n    print(error)\n",
+        "import contfric as cf\nprint(*[n for n in cf.model_names() if 'plugin' in n or n == "
+        "'damped'])\nprint(cf.load_model('damped').name, "
+        "cf.load_model('class-of-plugin').modes[3].rank)\nsignature = "
+        "cf.load_signature('there-and-back')\nprint(signature.model is cf.load_model('damped'), "
+        "cf.signature_names('damped'))\ntry:\n    cf.load_model('broken-of-plugin')\nexcept cf.ModelError "
+        "as error:\n    print(error)\ntry:\n    cf.load_model('dampd')\nexcept cf.ParameterError as "
+        "error:\n    print(error)\n",
     )
     assert done.returncode == 0, done.stderr
     names, loaded, signature, broken, unknown = done.stdout.splitlines()
@@ -175,9 +173,8 @@ def test_results_carry_their_model(orbit: cf.Orbit, tmp_path: Path) -> None:
     """Another process that never saw the model file reads the orbit, and computes with it."""
     cf.save(orbit, tmp_path / "orbit.npz")
     code = (
-        "import contfric as cf\n"
-        f"orbit = cf.load({str(tmp_path / 'orbit.npz')!r})\n"
-        "print(repr(orbit.x_max), orbit.model.name)\n"
+        f"import contfric as cf\norbit = cf.load({str(tmp_path / 'orbit.npz')!r})\nprint(repr(orbit.x_max), "
+        "orbit.model.name)\n"
     )
     done = in_site(tmp_path, code)
     assert done.returncode == 0, done.stderr
@@ -393,12 +390,10 @@ def test_models_work_without_a_cache(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     (tmp_path / "damped.yaml").write_text(YAML.format(name="damped"))
     code = (
-        "import os, numpy as np\n"
-        f"os.environ['CONTFRIC_CACHE_DIR'] = {str(tmp_path / 'file' / 'cache')!r}\n"
-        "import contfric as cf\n"
-        f"model = cf.load_model({str(tmp_path / 'damped.yaml')!r})\n"
-        "none = np.empty(0, dtype=np.int64)\n"
-        "print(model.flow.period(model.vector({'Omega': 2 * np.pi}), none, np.empty(0)))\n"
+        "import os, numpy as np\nos.environ['CONTFRIC_CACHE_DIR'] = "
+        f"{str(tmp_path / 'file' / 'cache')!r}\nimport contfric as cf\nmodel = "
+        f"cf.load_model({str(tmp_path / 'damped.yaml')!r})\nnone = np.empty(0, "
+        "dtype=np.int64)\nprint(model.flow.period(model.vector({'Omega': 2 * np.pi}), none, np.empty(0)))\n"
     )
     done = in_site(tmp_path, code)
     assert done.returncode == 0, done.stderr

@@ -112,10 +112,9 @@ def test_an_angle_may_be_given_in_any_turn(turn: int, tmp_path: Path) -> None:
 def test_a_state_that_is_in_no_domain_is_told_its_distances(tmp_path, state) -> None:
     path = tmp_path / "hopper.yaml"
     path.write_text(
-        "name: hopper\nstates: [x, v]\nparameters: {w: 1.5, d: 0.3}\nperiod: 2*pi/w\n"
-        "surfaces: {wall: {observable: x, level: d}}\n"
-        "modes: {free: {in: {wall: -}, field: {x: v, v: -x - 0.1*v + cos(w*t)}}}\n"
-        "resets: {wall: {v: -0.8*v}}\n"
+        "name: hopper\nstates: [x, v]\nparameters: {w: 1.5, d: 0.3}\nperiod: 2*pi/w\nsurfaces: {wall: "
+        "{observable: x, level: d}}\nmodes: {free: {in: {wall: -}, field: {x: v, v: -x - 0.1*v + "
+        "cos(w*t)}}}\nresets: {wall: {v: -0.8*v}}\n"
     )
     off = f"{state[0] - 0.3:+.3g}".replace("+", r"\+")
     with pytest.raises(

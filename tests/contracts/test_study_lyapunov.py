@@ -67,10 +67,8 @@ def test_a_map_alone(write, tmp_path: Path) -> None:
 def test_a_map_alone_loads_no_continuation(write, tmp_path: Path) -> None:
     path = write(HEAD + GRID)
     code = (
-        "import sys, contfric as cf\n"
-        "cf.run_study(sys.argv[1], sys.argv[2])\n"
-        "print([m for m in ('contfric.continuation.core.march', 'contfric.atlas.explore',"
-        " 'matplotlib') if m in sys.modules])"
+        "import sys, contfric as cf\ncf.run_study(sys.argv[1], sys.argv[2])\nprint([m for m in "
+        "('contfric.continuation.core.march', 'contfric.atlas.explore', 'matplotlib') if m in sys.modules])"
     )
     arguments = [sys.executable, "-c", code, str(path), str(tmp_path / "out")]
     done = subprocess.run(arguments, capture_output=True, text=True, check=True)

@@ -58,9 +58,8 @@ def run_installed(installed: Path, code: str, cache: Path) -> str:
 def test_wheel_runs_fig05_from_an_empty_folder(installed: Path, tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(installed)}
     code = (
-        "import contfric, sys; from contfric.cli import main;"
-        "print(contfric.__file__, file=sys.stderr);"
-        "sys.exit(main(['run', 'fig05', '--out', 'results']))"
+        "import contfric, sys; from contfric.cli import main;print(contfric.__file__, "
+        "file=sys.stderr);sys.exit(main(['run', 'fig05', '--out', 'results']))"
     )
     done = subprocess.run(
         check=False,

@@ -17,7 +17,6 @@ from contfric.models.generated.table_flow import CodedFlow
 from contfric.models.language.coefficients import AFFINE, Affine, symbols
 from contfric.models.language.grammar import FLOATS, Scope, parse
 from contfric.models.language.not_affine import NotAffineError
-from contfric.models.reading.describe import from_text
 from contfric.simulation.simulate import simulate
 from contfric.simulation.tables import tables
 
@@ -31,7 +30,7 @@ POINTS = 12
 
 def flows(name: str) -> tuple[cf.Model, Any, Any]:
     model = cf.load_model(name)
-    coded = CodedFlow(Forms(from_text(model.definition))).flow
+    coded = CodedFlow(Forms(model.description)).flow
     return model, coded, load_module(model.definition).compiled_flow(1e-12)
 
 
@@ -231,8 +230,8 @@ def test_its_orbit_is_that_of_the_equations(three: cf.Model) -> None:
     from scipy.integrate import solve_ivp
 
     orbit = cf.find_orbit(three, three.defaults)
-    evaluator_fields = {m.name: m.field for m in from_text(three.definition).modes}
-    names = from_text(three.definition).names
+    evaluator_fields = {m.name: m.field for m in three.description.modes}
+    names = three.description.names
     for i, (mode, _) in enumerate(orbit.itinerary):
         (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
 

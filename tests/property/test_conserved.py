@@ -97,12 +97,9 @@ def test_a_slider_that_never_slips_has_an_offset() -> None:
 
 
 def test_the_fields_of_contacts_at_rest_conserve_it_exactly() -> None:
-    from contfric.models.reading.describe import from_text
 
     model = two_masses()
-    field = floats(from_text(model.definition)).field(
-        "ps", model.defaults, 0.3, [0.5, 0.2, 0.7, 0.0]
-    )
+    field = floats(model.description).field("ps", model.defaults, 0.3, [0.5, 0.2, 0.7, 0.0])
     assert field[1] == 0.0
     assert field[3] == 0.0
 

@@ -16,7 +16,6 @@ from scipy.sparse import csr_matrix
 import contfric as cf
 from contfric.errors import ModelError
 from contfric.models.described.evaluate import floats
-from contfric.models.reading.describe import from_text
 
 PARAMETERS = {"Omega": 0.9, "S": 0.25, "S0": 0.3, "F": 1.1, "kd": 1.7, "e": 0.6}
 #: Directions of contacts that act on masses of their own where the mass matrix is diagonal.
@@ -69,7 +68,7 @@ def pulls(letters: dict[str, str], y: np.ndarray) -> np.ndarray:
 @given(seed=st.integers(0, 10_000))
 def test_every_mode_obeys_the_equations_of_motion(seed: int) -> None:
     model, parts = random_structure(seed)
-    evaluator = floats(from_text(model.definition))
+    evaluator = floats(model.description)
     rng, omega, checked = np.random.default_rng(seed + 1), PARAMETERS["Omega"], 0
     for mode in model.modes:
         states = mode.name.removesuffix("-")  # where nothing acts the mode is divided by a section
@@ -439,7 +438,7 @@ def test_matrices_from_files(tmp_path: Any) -> None:
     path.write_text("\n".join(lines))
     model = cf.load_model(path)
     y = [0.3, -0.7, 0.4, 0.1]
-    rates = floats(from_text(model.definition)).field("p", model.defaults, 0.0, y)
+    rates = floats(model.description).field("p", model.defaults, 0.0, y)
     force = np.array([-0.25, 1.0]) - 0.05 * np.array(y[2:]) - stiffness @ np.array(y[:2])
     assert rates[2:] == pytest.approx(list(force))
     path.write_text("\n".join(lines).replace("array: K", "array: KK"))
@@ -614,7 +613,7 @@ def test_a_matrix_from_a_file_that_changes_a_little_is_another_one(
         model = cf.load_model(file)
         y = np.zeros(2 * size)
         y[j] = 1.0
-        rates = floats(from_text(model.definition)).field("p", model.defaults, 0.0, list(y))
+        rates = floats(model.description).field("p", model.defaults, 0.0, list(y))
         force = float(i == 0) * (1.0 - 0.2)
         assert rates[size + i] == pytest.approx(force - stiffness[i, j], rel=1e-14, abs=1e-14)
 

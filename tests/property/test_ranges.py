@@ -12,8 +12,9 @@ from scipy.integrate import solve_ivp
 import contfric as cf
 from contfric.errors import ModelError
 from contfric.models.check import Severity
+from contfric.models.described.reading_back import from_text
 from contfric.models.generated.symbols import Formulas
-from contfric.models.reading.describe import describe, from_text
+from contfric.models.reading.describe import describe
 
 #: Pulse vaccination: between pulses the infectives fall by ten orders of magnitude and more.
 EPIDEMIC = """

@@ -28,10 +28,9 @@ def rooms(rng: np.random.Generator, order: tuple[int, ...]) -> tuple[str, dict[s
         field = f"x: {one}*q1 - a*x - k*(x - y) + 1.5, y: {two}*q2 - a*y - k*(y - x) + 1.5"
         modes += f"  m{one}{two}: {{in: {{{sides}}}, field: {{{field}}}}}\n"
     return (
-        f"name: rooms\nstates: [x, y]\nparameters: {p}\nautonomous: true\nsurfaces:\n"
-        "  hot1: {observable: x, level: h1}\n  cold1: {observable: x, level: l1}\n"
-        "  hot2: {observable: y, level: h2}\n  cold2: {observable: y, level: l2}\n"
-        f"modes:\n{modes}spread: {{x: 22, y: 22}}\n"
+        f"name: rooms\nstates: [x, y]\nparameters: {p}\nautonomous: true\nsurfaces:\n  hot1: {{observable: "
+        "x, level: h1}\n  cold1: {observable: x, level: l1}\n  hot2: {observable: y, level: h2}\n  cold2: "
+        f"{{observable: y, level: l2}}\nmodes:\n{modes}spread: {{x: 22, y: 22}}\n"
     ), p
 
 
@@ -60,11 +59,10 @@ def gated(seed: int) -> tuple[str, str]:
     ]
     order = rng.permutation(3)
     return (
-        f"name: gated\nstates: [x, y]\nparameters: {{c: {float(rng.uniform(0.2, 0.8))!r}}}\nperiod: 2*pi\n"
-        "surfaces:\n  big: {observable: y, level: c}\n"
-        "  left: {observable: x, level: -1}\n  right: {observable: x, level: 1}\n"
-        f"modes:\n{''.join(modes[i] for i in order)}"
-        "resets:\n  left: {to: [low, down], from: [up]}\n  right: {to: [low, up], from: [down]}\n"
+        f"name: gated\nstates: [x, y]\nparameters: {{c: {float(rng.uniform(0.2, 0.8))!r}}}\nperiod: "
+        "2*pi\nsurfaces:\n  big: {observable: y, level: c}\n  left: {observable: x, level: -1}\n  right: "
+        f"{{observable: x, level: 1}}\nmodes:\n{''.join(modes[i] for i in order)}resets:\n  left: {{to: "
+        "[low, down], from: [up]}\n  right: {to: [low, up], from: [down]}\n"
     ), named
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import with_entries
 from contfric.atlas.leaving.short_branches import is_short
 from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
 from contfric.bvp.conserved import conserved
@@ -366,8 +367,9 @@ def _covered(diagram: Diagram) -> tuple[float, float]:
 
 
 def _wanted(diagram: Diagram, value: float) -> int | None:
-    vector = diagram.branches[0].vector.copy()
-    vector[diagram.model.index_of(diagram.parameter)] = value
+    vector = with_entries(
+        diagram.branches[0].vector, diagram.model.index_of(diagram.parameter), value
+    )
     return index_at_infinity(diagram.model, vector)
 
 
@@ -388,8 +390,7 @@ def _sum_at(diagram: Diagram, value: float) -> int | None:
 
 def orbits_at(branch: Branch, value: float) -> Iterator[Orbit]:
     """Yield the orbits of a branch at a parameter value, solved there: one for each time it takes it."""
-    vector = branch.vector.copy()
-    vector[branch.model.index_of(branch.parameter)] = value
+    vector = with_entries(branch.vector, branch.model.index_of(branch.parameter), value)
     for location, guess in guesses(branch, vector, value):
         solved = refine(guess, damped=False)
         nearest = int(np.argmin(np.abs(branch.arc - location)))

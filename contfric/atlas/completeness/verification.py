@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.arrays import with_entries
 from contfric.atlas.completeness.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.completeness.degenerate import (
     Degenerate,
@@ -351,8 +352,7 @@ def _at_inner_values(branch: Branch) -> Iterator[Orbit]:
     low, width = float(branch.values.min()), float(np.ptp(branch.values))
     active = branch.model.index_of(branch.parameter)
     for value in (low + share * width for share in INSIDE):
-        vector = branch.vector.copy()
-        vector[active] = value
+        vector = with_entries(branch.vector, active, value)
         yield from (refine(guess, damped=False) for _, guess in guesses(branch, vector, value))
 
 

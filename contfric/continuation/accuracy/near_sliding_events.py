@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.attributes import altered
 from contfric.continuation.half_branch import first_point, point_before
 from contfric.continuation.points import EXTRA, Point
@@ -120,8 +120,7 @@ def _point_at(step: Step, back: float) -> Point | None:
 
     joints, tangent = along(before.joints, event.joints, before.tangent)
     w, direction = along(before.w, event.w, before.direction)
-    vector = step.orbit.vector.copy()
-    vector[step.active] = w[0]
+    vector = with_entries(step.orbit.vector, step.active, w[0])
     predicted = altered(step.orbit, joints=joints, vector=vector)
     point = _if_finite(first_point(predicted, step.settings, tangent, float(direction[0])))
     if point is None:

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.bvp.linear import equations_at, null_space
 from contfric.continuation.accuracy.rounding import LEAST
 from contfric.continuation.branch import Branch
@@ -180,8 +180,7 @@ def _at_value(orbit: Orbit, active: int, border: Border) -> VerticalFamily | Non
     trials: list[tuple[float, float]] = []
     value = start
     for _ in range(_TRIALS):
-        vector = orbit.vector.copy()
-        vector[active] = value
+        vector = with_entries(orbit.vector, active, value)
         joints = _reduced(orbit, vector, border)
         if joints is None:
             return None

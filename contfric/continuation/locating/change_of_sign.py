@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.tally import tally
 from contfric.bvp.system import System
 from contfric.continuation.half_branch import branch_problem
@@ -135,8 +135,7 @@ def locate_value(
     if found is None:
         return before
     # the bracket ends within rounding of the value: solve at the value itself
-    vector = orbit.vector.copy()
-    vector[orbit.model.index_of(settings.parameter)] = target
+    vector = with_entries(orbit.vector, orbit.model.index_of(settings.parameter), target)
     exact = refine(Orbit(orbit.system, found.joints, vector, np.inf), damped=False)
     if exact.converged and np.abs(exact.joints - found.joints).max() < 1e-6:
         found.joints, found.w = exact.joints, np.array([target])

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.bvp.linear import equations_at
 from contfric.bvp.system import System
 from contfric.continuation.points import Point, Settings
@@ -134,8 +134,7 @@ class _ChainProblem:
 
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return joints and parameters."""
-        vector = self.vector.copy()
-        vector[self.active] = x[-1] * self.width
+        vector = with_entries(self.vector, self.active, x[-1] * self.width)
         return x[:-1].reshape(self.system.segments, -1).copy(), vector
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from contfric.base.arrays import with_entries
 from contfric.continuation.accuracy.rounding import LEAST
 from contfric.continuation.branch import Branch
 from contfric.continuation.half_branch import first_point
@@ -85,8 +86,7 @@ def _between(branch: Branch, k: int, share: float, active: int, settings: Settin
     """Return the orbit at a share of the step after a point, solved normal to the chord."""
     chord = branch.joints[k + 1] - branch.joints[k]
     slope = float(branch.values[k + 1] - branch.values[k])
-    vector = branch.vector.copy()
-    vector[active] = branch.values[k] + share * slope
+    vector = with_entries(branch.vector, active, branch.values[k] + share * slope)
     guess = Orbit(branch.system, branch.joints[k] + share * chord, vector, 0.0)
     size = float(np.sqrt(np.sum(chord**2) / len(chord) + slope**2 * settings.scale))
     point = first_point(guess, settings, chord / size, slope / size)

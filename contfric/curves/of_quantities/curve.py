@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.base.tabled import Columns, Tabled
 from contfric.bvp.system import System
 from contfric.curves.special import CurveEnd
@@ -78,8 +78,9 @@ class QuantityCurve(Tabled):
     def __getitem__(self, index: int) -> Orbit:
         """Return the orbit at one point."""
         index = operator.index(index)
-        vector = self.vector.copy()
-        vector[[self.model.index_of(name) for name in self.parameters]] = self.values[index]
+        vector = with_entries(
+            self.vector, [self.model.index_of(name) for name in self.parameters], self.values[index]
+        )
         return Orbit(self.system, self.joints[index], vector, 0.0)
 
     def __iter__(self) -> Iterator[Orbit]:

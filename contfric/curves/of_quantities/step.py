@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray, IntArray
+from contfric.base.arrays import FloatArray, IntArray, with_entries
 from contfric.base.interrupts import held_back
 from contfric.bvp.linear import equations_at
 from contfric.bvp.system import System
@@ -149,9 +149,8 @@ class Held:
 
     def orbit_at(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return the orbit with these joints and parameters."""
-        vector = self.orbit.vector.copy()
-        vector[self.which] = w
-        return replace(self.orbit, joints=joints, vector=vector)
+        moved = with_entries(self.orbit.vector, self.which, w)
+        return replace(self.orbit, joints=joints, vector=moved)
 
     def orbit_of(self, point: Point) -> Orbit:
         """Return a point as an orbit."""

@@ -38,7 +38,7 @@ from contfric.errors import NotationError
 from contfric.events.local.touching import coming_back, second_rate
 from contfric.events.local.zero_acceleration import only_comes_back, touch_of
 from contfric.models.definition import Model
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.orbit.orbit import Orbit
 from contfric.signature.edits import Edit, entered, split, swap_edit
 from contfric.signature.holds import is_hold

@@ -24,10 +24,10 @@ from contfric.models.balls.numbers import zeros
 from contfric.models.definition import Model
 from contfric.models.deriving.visited_modes import composition_of
 from contfric.models.described.description import Description
+from contfric.models.described.reading_back import from_text
 from contfric.models.generated.affine import AffineForm
 from contfric.models.generated.symbols import Formulas
 from contfric.models.parts import Observable
-from contfric.models.reading.describe import from_text
 
 
 @dataclass(frozen=True, eq=False)

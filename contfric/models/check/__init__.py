@@ -72,7 +72,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
-    from contfric.models.shorthand.tied import tied
+    from contfric.models.tied import tied
 
     loaded, given = tied(model, params)
     report = ModelReport(loaded.name, closed=loaded.closed_form, integrated=loaded.integrated)

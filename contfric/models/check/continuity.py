@@ -15,12 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray
+from contfric.base.arrays import FloatArray, with_entries
 from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Domain, Reset
-from contfric.models.reading.describe import from_text
 
 #: States that are tried, those of each mode from which lines are followed, and samples of a line.
 _TRIED, _STATES, _SAMPLES = 100, 2, 160
@@ -101,7 +100,7 @@ def _may_jump(probe: Probe) -> list[str]:
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import cannot_jump
 
-    formulas = Formulas(from_text(probe.model.definition))
+    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     return [name for name, h in formulas.heights().items() if not cannot_jump(h, moving)]
 
@@ -178,9 +177,7 @@ def _at_time(y: FloatArray, time: float) -> tuple[float, FloatArray]:
 
 
 def _at_state(t: float, y: FloatArray, k: int, value: float) -> tuple[float, FloatArray]:
-    moved = y.copy()
-    moved[k] = value
-    return t, moved
+    return t, with_entries(y, k, value)
 
 
 def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
@@ -219,7 +216,7 @@ def _continuous_resets(probe: Probe) -> set[str]:
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import cannot_jump
 
-    formulas = Formulas(from_text(probe.model.definition))
+    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     return {
         surface.name

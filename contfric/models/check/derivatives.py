@@ -18,14 +18,12 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.models.check.probe import Probe
+from contfric.models.check.probe import Probe, field_of
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.definition import Model
 from contfric.models.described.description import Description
 from contfric.models.described.evaluate import Evaluator
-from contfric.models.generated.build import field_of
 from contfric.models.language.grammar import UNARY, Algebra
-from contfric.models.reading.describe import from_text
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5
@@ -274,7 +272,7 @@ class _Described(_Cases):
     """The same with the formulas of a description, in many digits."""
 
     def __init__(self, model: Model) -> None:
-        self.description = from_text(model.definition)
+        self.description = model.description
         super().__init__(model, self.description.period or "0")
         self.exact = digits(self.description)
         # the rates of all observables of a mode need the same fields

@@ -10,7 +10,6 @@ from contfric.base.arrays import FloatArray
 from contfric.models.check.continuity import Line, jump_along, lines_in
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.reading.describe import from_text
 
 #: This share next to a kink ``acos(cos(t))`` still has six digits of its slope, whose parts cancel; and the
 #: share of a jump by which slopes may change so near it.
@@ -51,7 +50,7 @@ def _with_hidden_kinks(probe: Probe) -> list[str]:
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import may_have_kinks
 
-    formulas = Formulas(from_text(probe.model.definition))
+    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     modes = [mode.name for mode in probe.model.modes for _ in formulas.pieces]
     found = (

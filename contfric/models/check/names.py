@@ -7,7 +7,6 @@ from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Model
 from contfric.models.language.grammar import parse
-from contfric.models.reading.describe import from_text
 
 #: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
 _STARTS = 40
@@ -29,8 +28,7 @@ def check_constraints(report: ModelReport, model: Model) -> bool:
             shown = ", ".join(f"{n} = {model.defaults[n]!r}" for n in constraint.coefficients)
             report.error(
                 Topic.CONSTRAINTS,
-                f"the defaults violate {constraint.text} ({shown}): change one of them, or the "
-                "constraint",
+                f"the defaults violate {constraint.text} ({shown}): change one of them, or the constraint",
             )
     return not any(f.topic is Topic.CONSTRAINTS for f in report.findings)
 
@@ -39,7 +37,7 @@ def check_names(report: ModelReport, model: Model) -> None:
     """Check that every parameter changes something, and that every state is moved."""
     if not model.definition:
         return
-    description = from_text(model.definition)
+    description = model.description
     names, used = description.names, set[str]()
     dynamics = [rate for mode in description.modes for rate in mode.field]
     events = [o.formula for o in description.observables] + [s.level for s in description.surfaces]
@@ -93,7 +91,7 @@ def check_kinks(report: ModelReport, model: Model) -> None:
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import kinks_in
 
-    formulas = Formulas(from_text(model.definition))
+    formulas = Formulas(model.description)
     symbols = (*formulas.y, *formulas.p)
     names = dict(zip(symbols, (*model.states, *model.parameter_names), strict=True))
     modes = [mode for mode in model.modes for _ in formulas.pieces]
@@ -125,7 +123,7 @@ def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
     from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import kinks_in
 
-    formulas = Formulas(from_text(model.definition))
+    formulas = Formulas(model.description)
     symbols = (formulas.t, *formulas.y, *formulas.p)
     names = dict(zip(symbols, ("t", *model.states, *model.parameter_names), strict=True))
     order = [surface.name for surface in formulas.description.surfaces]

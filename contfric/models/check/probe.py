@@ -8,11 +8,13 @@ import random
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.definition import Model
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.view import FlowView
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
@@ -26,6 +28,23 @@ _STILL = 2.0**-53
 ON = 1e-12
 #: Modes up to which each is looked at in as many states as one mode alone is.
 FEW_MODES = 9
+
+
+def field_of(model: Model) -> Any:
+    """Return the compiled field of the modes of a model, without the flow, which takes longer.
+
+    It is that of the flow's own definition, without names and titles: another text is another module. Modes
+    that are made when they are visited have theirs in the flow that grows with them.
+    """
+    from contfric.models.generated.build import GeneratedFlow, load_module
+    from contfric.models.generated.table_flow import coded_flow
+
+    if isinstance(model, ComposedModel):
+        return model.coded.field
+    flow = model.flow_factory
+    definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
+    found = coded_flow(definition)
+    return load_module(definition).field_of if found is None else found.field
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +113,6 @@ class Probe:
         """Return the rates of all states in a mode."""
         n = len(y)
         if self.model.definition:  # without the flow, which takes much longer to compile
-            from contfric.models.generated.build import field_of
-
             out, field = np.empty(n), field_of(self.model)
             m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)
             field(m, t, y, self.vector, none, out, np.empty((0, 0)))
@@ -104,8 +121,6 @@ class Probe:
 
     def slopes(self, mode: str, t: float, y: FloatArray) -> FloatArray:
         """Return the derivatives of these rates by time and by state, shape (n, 1 + n), from the formulas."""
-        from contfric.models.generated.build import field_of
-
         n = len(y)
         out, jac = np.empty(n), np.empty((n, 1 + n))
         m, none = self.model.mode_index[mode], np.empty(0, dtype=np.int64)

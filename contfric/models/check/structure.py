@@ -308,9 +308,8 @@ def check_sliding(report: ModelReport, probe: Probe) -> None:
                 if not abs(rate) <= _SAME * (1.0 + np.abs(place[1]).max()):
                     report.error(
                         Topic.SLIDING,
-                        f"mode '{mode.name}' leaves its surface '{name}': at "
-                        f"{probe.shown(*place)} the rate of "
-                        f"'{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
+                        f"mode '{mode.name}' leaves its surface '{name}': at {probe.shown(*place)} the rate "
+                        f"of '{model.surface_by_name[name].observable}' is {rate:.6g}, it must be 0",
                     )
                     return
 

@@ -28,6 +28,7 @@ from contfric.models.deriving.measuring import displacement_of, extrema_at_joint
 from contfric.models.deriving.sections import clear_surfaces, join_domains, joined_modes
 from contfric.models.described.description import Description, Range
 from contfric.models.described.evaluate import Evaluator, Sampler, defaults, floats
+from contfric.models.described.reading_back import from_text
 from contfric.models.described.regions import domains_of, is_possible, ordered_surfaces
 from contfric.models.entries import EntryError
 from contfric.models.generated.build import GeneratedFlow
@@ -63,8 +64,6 @@ class Spread:
 
 @lru_cache(maxsize=64)
 def _evaluator(definition: str) -> Evaluator[float]:
-    from contfric.models.reading.describe import from_text
-
     return floats(from_text(definition))
 
 
@@ -77,7 +76,7 @@ def model_from(description: Description) -> Model:
         If the description contradicts itself; with the address of the entry.
     """
     if description.structure:
-        from contfric.models.growing_model import composed_from
+        from contfric.models.deriving.growing_model import composed_from
 
         return composed_from(description)
     params = defaults(description)

@@ -28,6 +28,7 @@ from contfric.models.deriving.measuring import proportional
 from contfric.models.deriving.sections import has_kinks, joined_modes
 from contfric.models.described.description import Description, ModeText
 from contfric.models.described.evaluate import Sampler, defaults, floats
+from contfric.models.described.reading_back import described, from_text
 from contfric.models.described.regions import domains_of, engine_order, known_sides
 from contfric.models.described.reset_modes import named_parts
 from contfric.models.parts import MOST_SURFACES
@@ -70,18 +71,17 @@ def with_phase(model: Model, mode: str) -> Model | None:
 @lru_cache(maxsize=_MODELS)
 def _with_phase(definition: str, mode: str) -> Model | None:
     from contfric.models.deriving.derive import model_from
-    from contfric.models.reading.describe import describe, from_text
 
     description = from_text(definition)
     data = description.data()
     if not mode:
         parts = phase_parts(description, data, however_many=True)
-        return model_from(describe({**data, **parts})) if parts else None
+        return model_from(described({**data, **parts})) if parts else None
     for state in description.states:
         parts = _rate_parts(description, data, mode, state)
         with suppress(ModelError):  # its symmetry leads to no section
             if parts:
-                return model_from(describe({**data, **parts}))
+                return model_from(described({**data, **parts}))
     return None
 
 

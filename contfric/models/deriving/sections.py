@@ -21,8 +21,8 @@ from contfric.models.definition import Domain, Surface
 from contfric.models.described.description import Description, ModeText
 from contfric.models.described.evaluate import Sampler, defaults, floats
 from contfric.models.described.regions import domains_of, engine_order, is_possible
-from contfric.models.generated.on_disk import derived
 from contfric.models.language.grammar import parse
+from contfric.remember.derived import derived
 
 #: Functions with kinks: what they are on either side of a surface only formulas tell.
 _KINKED = frozenset({"abs", "sign", "where", "min", "max"})

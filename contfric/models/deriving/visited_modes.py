@@ -13,7 +13,7 @@ ways through a surface    (what else holds where it is met, mode that follows): 
                           elements along one direction stop at once. One way only for everything else
 ========================  =================================================================================
 
-The engine's numbers of modes (:class:`contfric.models.growing_model.ComposedModel`) are given in
+The engine's numbers of modes (:class:`contfric.models.deriving.growing_model.ComposedModel`) are given in
 the order of the first visit; itineraries and signatures have the names.
 """
 
@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 
 from contfric.models.deriving.phases import PART, PhaseParts
 from contfric.models.described.description import ModeText
+from contfric.models.described.reading_back import from_text
 from contfric.models.entries import SIDES
 from contfric.models.generated.formula_tables import Forms
 from contfric.models.lazy_mapping import Made
@@ -392,6 +393,4 @@ class Composition:
 @lru_cache(maxsize=16)
 def composition_of(definition: str) -> Composition:
     """Return the composition of a definition that has a structure."""
-    from contfric.models.reading.describe import from_text
-
     return Composition(from_text(definition))

@@ -20,20 +20,19 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from contfric.base.checked import read_sealed, write_sealed
 from contfric.base.resources import SHIPPED_KERNELS, user_cache
 from contfric.base.sources import kernels_digest
 from contfric.errors import ResultFileError
+from contfric.models.described.reading_back import from_text
 from contfric.models.generated.formula_tables import forms_of
 from contfric.models.generated.table_flow import coded_flow
-from contfric.models.growing_model import ComposedModel
 
 if TYPE_CHECKING:
     from contfric.compiled import Kernel
     from contfric.flow.interface import CompiledFlow
-    from contfric.models.definition import Model
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,6 @@ def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
     """Return the flow of a model whose modes of chatter are contact alone, with their impacts."""
     from contfric.flow.chattering import ChatterMode, with_chatter
     from contfric.models.described.regions import engine_order
-    from contfric.models.reading.describe import from_text
 
     description = from_text(definition)
     modes = [mode.name for mode in description.modes]
@@ -75,20 +73,6 @@ def _with_chatter(flow: CompiledFlow, definition: str) -> CompiledFlow:
         other = (modes.index(own.other), observables.index(own.other_lift)) if own.other else ()
         chatters.append(ChatterMode(*row, *other))
     return with_chatter(flow, len(modes), chatters)
-
-
-def field_of(model: Model) -> Any:
-    """Return the compiled field of the modes of a model, without the flow, which takes longer.
-
-    It is that of the flow's own definition, without names and titles: another text is another module. Modes
-    that are made when they are visited have theirs in the flow that grows with them.
-    """
-    if isinstance(model, ComposedModel):
-        return model.coded.field
-    flow = model.flow_factory
-    definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
-    found = coded_flow(definition)
-    return load_module(definition).field_of if found is None else found.field
 
 
 def kernels_of(flow: GeneratedFlow) -> list[Kernel]:
@@ -176,7 +160,6 @@ def _generator() -> str:
 
 def _generated(definition: str, digest: str) -> str:
     from contfric.models.generated.generate import module_source
-    from contfric.models.reading.describe import from_text
 
     return module_source(from_text(definition), digest)
 

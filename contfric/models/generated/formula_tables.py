@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from contfric.models.described.description import Description, ModeText
+from contfric.models.described.reading_back import from_text
 from contfric.models.described.regions import engine_order, known_sides
 from contfric.models.generated.columns import Column
 from contfric.models.language.coefficients import (
@@ -269,8 +270,6 @@ class CodedTables:
 @lru_cache(maxsize=64)
 def forms_of(definition: str) -> Forms | None:
     """Return the affine forms of a definition, if its formulas are to be tables; else None."""
-    from contfric.models.reading.describe import from_text
-
     description = from_text(definition)
     if not description.structure and len(description.modes) * len(description.states) <= _FEW:
         return None

@@ -34,7 +34,7 @@ class TransitionMaps(ChatterMaps):
 
     @property
     def composed(self) -> bool:
-        """Whether modes are made when they are visited (:mod:`contfric.models.growing_model`)."""
+        """Whether modes are made when they are visited (:mod:`contfric.models.deriving.growing_model`)."""
         return False
 
     def mode_order(self, name: str) -> int:

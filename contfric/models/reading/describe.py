@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
-from contfric.errors import ModelError
 from contfric.models.definition import Departure, Observable, Parameter, Surface
 from contfric.models.deriving.measuring import measured
 from contfric.models.described.description import Description, DomainText, ModeText
@@ -16,7 +13,6 @@ from contfric.models.described.quantity_entries import check_quantities
 from contfric.models.described.ranges import check_ranges, ranges_of, spread_of
 from contfric.models.described.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.entries import EntryError, known_keys, known_sides, one_of
-from contfric.models.generated.on_disk import derived
 from contfric.models.language.names import Names
 from contfric.models.parts import Chatter
 from contfric.models.shorthand.clocks import TICK
@@ -24,28 +20,6 @@ from contfric.models.shorthand.written_out import expanded
 from contfric.models.structures.contact_laws import ContactLaws, check_laws
 from contfric.models.structures.contact_modes import with_contacts
 from contfric.models.structures.names import COORDINATES
-
-
-@lru_cache(maxsize=16)
-def from_text(text: str) -> Description:
-    """Read a description that :attr:`Description.text` wrote; one that was read before, from disk.
-
-    Raises
-    ------
-    ModelError
-        If it is no description.
-    """
-    return derived("description", text, lambda: _from_text(text))
-
-
-def _from_text(text: str) -> Description:
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise ModelError(f"the definition of the model is damaged: {error}") from None
-    if not isinstance(data, dict):
-        raise ModelError("the definition of the model is damaged: it is no mapping")
-    return describe(data)
 
 
 def describe(data: Mapping[str, Any]) -> Description:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from contfric.errors import ModelError, NotationError, did_you_mean
 from contfric.models.definition import Model
 from contfric.models.entries import EntryError, plain
-from contfric.models.generated.on_disk import derived
 from contfric.models.structures.matrices import loaded
+from contfric.remember.derived import derived
 
 if TYPE_CHECKING:
     from contfric.base.yaml_lines import Address, LocatedYaml
@@ -100,8 +100,8 @@ def model_of(definition: str) -> Model:
 
 def _model_from(definition: str) -> Model:
     from contfric.models.deriving.derive import model_from
+    from contfric.models.described.reading_back import from_text
     from contfric.models.generated.build import prepare
-    from contfric.models.reading.describe import from_text
 
     description = from_text(definition)
     # written first: what has no value is reported by formula and place

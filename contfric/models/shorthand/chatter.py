@@ -32,6 +32,7 @@ from contfric.models.definition import Model
 from contfric.models.deriving.sections import joined_modes
 from contfric.models.described.description import Description, ModeText
 from contfric.models.described.evaluate import defaults
+from contfric.models.described.reading_back import described, from_text
 from contfric.models.entries import EntryError
 from contfric.models.generated.symbols import Formulas
 from contfric.models.language.formulas import vanishes
@@ -102,15 +103,14 @@ def with_chatter(model: Model) -> Model | None:
 def _with_chatter_at(definition: str, walls: tuple[str, ...]) -> Model | None:
     """Return the model of a definition with chatter at walls: to derive it takes longer than most orbits."""
     from contfric.models.deriving.derive import model_from
-    from contfric.models.reading.describe import describe, from_text
 
     data = from_text(definition).data()
     for surface in walls:
         asked = {**data["resets"], surface: {**data["resets"][surface], CHATTER: True}}
         with suppress(EntryError):
-            describe({**data, "resets": asked})
+            described({**data, "resets": asked})
             data["resets"] = asked
-    found = describe(data)
+    found = described(data)
     return model_from(found) if found.chatters else None
 
 

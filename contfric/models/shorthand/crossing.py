@@ -330,9 +330,8 @@ class _Limits:
                 apart = sympy.expand(high - low)
                 if abs(float(apart.subs(values))) < _NOTHING:
                     self.crossing.refuse(
-                        "two of the limits of sliding agree at the defaults, where their order is not "
-                        f"told ({self.crossing.text(low)} and {self.crossing.text(high)}): choose other "
-                        "defaults"
+                        "two of the limits of sliding agree at the defaults, where their order is not told "
+                        f"({self.crossing.text(low)} and {self.crossing.text(high)}): choose other defaults"
                     )
                 if not apart.free_symbols:
                     continue

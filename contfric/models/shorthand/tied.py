@@ -2,8 +2,7 @@
 
 A tied parameter is an expression of others, at every value that these take: a continuation in S moves both.
 It is put in its place in all formulas of the model, which has one parameter less; derivatives with respect to
-the others are right by themselves. `coulomb`, whose motion is written by hand, is taken by its formulas
-(`coulomb-yaml`), which move in closed form too.
+the others are right by themselves.
 """
 
 from __future__ import annotations
@@ -11,87 +10,15 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.errors import ModelError, did_you_mean
+from contfric.models.entries import EntryError
+from contfric.models.language.grammar import names_in, parse
 from contfric.models.shorthand.rewriting import OF_MODES, OTHERS, SHARED, rewritten, tree_of
 
-if TYPE_CHECKING:
-    from contfric.models import ModelSource
-    from contfric.models.definition import Model
-
-#: The key that ties a parameter, and models whose formulas stand in another one.
+#: The key that ties a parameter.
 _TIE = "tie"
-_FORMULAS = {"coulomb": "coulomb-yaml"}
-
-
-def tied(model: ModelSource, params: Any = None) -> tuple[Model, Mapping[str, Any]]:
-    """Return a model with the ties that its parameters ask for, and the parameters without these.
-
-    None are an empty mapping: the model has its defaults.
-
-    Raises
-    ------
-    ParameterError
-        If the parameters are no mapping, or a tie is not an expression of other parameters, or of a
-        model without formulas.
-
-    Examples
-    --------
-    >>> model, params = tied("coulomb", {"S": 0.3, "S0": {"tie": "S"}})
-    >>> model.parameter_names, params
-    (('Omega', 'S', 'h', 'zeta'), {'S': 0.3})
-    """
-    from contfric.models import load_model
-
-    found = load_model(model)
-    given = found.given_params(params)
-    ties = {name: value for name, value in given.items() if isinstance(value, Mapping)}
-    if not ties:
-        return found, given
-    free = {name: value for name, value in given.items() if name not in ties}
-    return with_ties(found, {name: _tie(name, value) for name, value in ties.items()}), free
-
-
-def _tie(name: str, value: Mapping[str, Any]) -> str:
-    if set(value) != {_TIE} or isinstance(value[_TIE], bool):
-        raise ParameterError(
-            f"parameter '{name}' is a number, or follows others such as {{tie: S}}; got {shown(dict(value))}"
-        )
-    return str(value[_TIE])
-
-
-def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
-    """Return a model in which parameters are expressions of others.
-
-    Parameters
-    ----------
-    ties : the expression of each, in those that are left
-
-    Raises
-    ------
-    ParameterError
-        If an expression has other names than those of parameters, or the model has no formulas.
-    """
-    from contfric.errors import ModelError
-    from contfric.models import load_model
-    from contfric.models.reading.describe import from_text
-    from contfric.models.reading.files import from_data
-
-    for name in ties:
-        model.index_of(name)
-    source = model if model.definition else load_model(_FORMULAS.get(model.name, model.name))
-    if not source.definition:
-        raise ParameterError(
-            f"model '{model.name}' is not declared by formulas: its parameters cannot be tied"
-        )
-    data = from_text(source.definition).data()
-    name = f"{model.name} with {', '.join(f'{k} = {v}' for k, v in ties.items())}"
-    parameters = {**data["parameters"], **{name: {_TIE: text} for name, text in ties.items()}}
-    try:
-        return from_data({**data, "name": name, "parameters": parameters})
-    except ModelError as error:
-        raise ParameterError(f"{name}: {error}") from None
 
 
 def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
@@ -102,10 +29,6 @@ def with_ties_put_in(data: dict[str, Any]) -> dict[str, Any]:
     EntryError
         If a tie is not an expression of other parameters.
     """
-    from contfric.errors import ModelError
-    from contfric.models.entries import EntryError
-    from contfric.models.language.grammar import names_in, parse
-
     parameters = data["parameters"]
     ties = {name: entry[_TIE] for name, entry in parameters.items() if _TIE in entry}
     if not ties:

@@ -89,10 +89,9 @@ def goes_round(trajectory: Trajectory, done: int) -> str:
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
-        f"the solution at {where} has not converged in {done} periods: it still changes by "
-        f"{mismatch:.1g} in {turns} period(s), more slowly than any exponential. The orbit is "
-        "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
-        "little, or add damping"
+        f"the solution at {where} has not converged in {done} periods: it still changes by {mismatch:.1g} "
+        f"in {turns} period(s), more slowly than any exponential. The orbit is marginally stable (a "
+        "multiplier is 1), as orbits of a continuum are. Move a parameter a little, or add damping"
     )
 
 

@@ -12,7 +12,7 @@ from contfric.base.arrays import FloatArray
 from contfric.errors import ConvergenceError, function_of, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
-from contfric.models.shorthand.tied import tied
+from contfric.models.tied import tied
 from contfric.orbit.finding.aperiodic import (
     MOST,
     MOST_PERIODS,

@@ -47,7 +47,7 @@ from contfric.flow.general import kernels_of
 from contfric.flow.layouts import FlowType
 from contfric.handle import TABLE, WEIGHTS, Block, Bound, HandleType, with_handle
 from contfric.models.definition import Model
-from contfric.models.growing_model import ComposedModel
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.orbit.functionals.integral_parts import IntegralCourse, reach_node
 from contfric.orbit.functionals.integral_rows import (
     TapeType,

@@ -195,9 +195,8 @@ def _laws(model: Model) -> tuple[ContactLaws, ...]:
 
 @cache
 def _evaluator(model: Model) -> Evaluator[float]:
-    from contfric.models.reading.describe import from_text
 
-    return floats(from_text(model.definition))
+    return floats(model.description)
 
 
 class Places:

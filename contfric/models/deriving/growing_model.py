@@ -325,9 +325,8 @@ class ComposedModel(Model):
         """The flow of the modes that were visited, in that order: the first is that in which none acts."""
         from contfric.models.generated.formula_tables import Forms
         from contfric.models.generated.table_flow import CodedFlow
-        from contfric.models.reading.describe import from_text
 
-        found = CodedFlow(Forms(from_text(self.definition)))
+        found = CodedFlow(Forms(self.description))
         for surface in self.surfaces[len(self.composition.declared) :]:
             found.see(*self.composition.surface(surface.name))
         for mode in self.modes[1:]:
