@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from contfric.censuses.conditions import Fate
 from contfric.censuses.itineraries import canonical_pair
 from contfric.censuses.orbits import Catalogue
+from contfric.censuses.result import SectionSearch
 from contfric.models.definition import Model
 from contfric.signature import ReducedItinerary
 
@@ -53,17 +54,9 @@ class Findings:
     ----------
     catalogue : the orbits known after it
     walks : an example of each itinerary from the section back to it or to its mirror image
-    starts, held, cut, jumps, open, solves, complete : as of the grid and of the search
-    farthest : largest position of a fixed point, 0 without any
+    done : what was done
     """
 
     catalogue: Catalogue
     walks: tuple[tuple[int, ...], ...]
-    starts: int
-    held: int
-    cut: int
-    jumps: int
-    open: int
-    solves: int
-    complete: bool
-    farthest: float
+    done: SectionSearch

@@ -15,7 +15,7 @@ Corners whose itineraries differ within the limits make a cell **mixed**: a disc
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,25 +108,15 @@ def common_walks(grid: Grid, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[n
 def near_cells(grid: Grid, cells: Cells, common: NDArray[np.bool_]) -> Iterator[Near]:
     """Yield the cells that are near to a fixed point, for every itinerary and number of periods."""
     code = grid.code[cells.rows[:, 0]]
-    for event in range(grid.events):
-        for half in (False, True):
-            closing = common[:, event] & (code[:, event] == (grid.image if half else grid.own))
-            chosen = np.flatnonzero(closing)
-            if len(chosen):
-                yield from _near(grid, cells, chosen, event, half)
 
-
-def _near(grid: Grid, cells: Cells, chosen: IntArray, event: int, half: bool) -> Iterator[Near]:
-    gaps = gaps_of(grid, cells.rows[chosen], event, half)
-    step, fraction = (2, _fraction(grid)) if half else (1, 1.0)
-    for periods in range(1, grid.limits.periods + 1, step):
-        here = gaps.copy()
-        here[..., 0] -= periods * fraction
-        low, high = here.min(axis=1), here.max(axis=1)
+    def is_near(gaps: FloatArray) -> NDArray[np.bool_]:
+        low, high = gaps.min(axis=1), gaps.max(axis=1)
         width = high - low
-        near = ((low - width <= 0.0) & (high + width >= 0.0)).all(axis=1)
-        if near.any():
-            yield Near(chosen[near], event, periods, half, here[near])
+        return np.asarray(((low - width <= 0.0) & (high + width >= 0.0)).all(axis=1))
+
+    for event, half, letter in _closings(grid):
+        chosen = np.flatnonzero(common[:, event] & (code[:, event] == letter))
+        yield from _near(grid, chosen, cells.rows[chosen], event, half, is_near)
 
 
 def closing_nodes(grid: Grid, rows: IntArray, limit: FloatArray) -> Iterator[Near]:
@@ -134,19 +124,40 @@ def closing_nodes(grid: Grid, rows: IntArray, limit: FloatArray) -> Iterator[Nea
 
     The cells of the result are the rows of the nodes.
     """
+
+    def is_near(gaps: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray((np.abs(gaps[:, 0]) <= limit).all(axis=1))
+
+    for event, half, letter in _closings(grid):
+        chosen = rows[grid.code[rows, event] == letter]
+        yield from _near(grid, chosen, chosen[:, None], event, half, is_near)
+
+
+def _closings(grid: Grid) -> Iterator[tuple[int, bool, int]]:
+    """Yield the events that may close an itinerary, by itself or with its mirror image, and their letters."""
     for event in range(grid.events):
-        for half in (False, True):
-            chosen = rows[grid.code[rows, event] == (grid.image if half else grid.own)]
-            if not len(chosen):
-                continue
-            gaps = gaps_of(grid, chosen, event, half)
-            step, fraction = (2, _fraction(grid)) if half else (1, 1.0)
-            for periods in range(1, grid.limits.periods + 1, step):
-                here = gaps.copy()
-                here[:, 0] -= periods * fraction
-                near = (np.abs(here) <= limit).all(axis=1)
-                if near.any():
-                    yield Near(chosen[near], event, periods, half, here[near][:, None, :])
+        yield from ((event, False, grid.own), (event, True, grid.image))
+
+
+def _near(
+    grid: Grid,
+    chosen: IntArray,
+    rows: IntArray,
+    event: int,
+    half: bool,
+    is_near: Callable[[FloatArray], NDArray[np.bool_]],
+) -> Iterator[Near]:
+    """Yield those of the chosen cells, with the rows of their corners, that are near for some periods."""
+    if not len(chosen):
+        return
+    gaps = gaps_of(grid, rows, event, half)
+    step, fraction = (2, _fraction(grid)) if half else (1, 1.0)
+    for periods in range(1, grid.limits.periods + 1, step):
+        here = gaps.copy()
+        here[..., 0] -= periods * fraction
+        near = is_near(here)
+        if near.any():
+            yield Near(chosen[near], event, periods, half, here[near])
 
 
 def _fraction(grid: Grid) -> float:

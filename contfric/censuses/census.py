@@ -22,7 +22,7 @@ from contfric.censuses.itineraries import canonical_pair, closed_itineraries
 from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import Census, SectionSearch
 from contfric.censuses.search import Progress, Search, searched
-from contfric.censuses.sections import Section, exit_arcs, period_of, sections_of
+from contfric.censuses.sections import Section, exit_arcs, sections_of
 from contfric.errors import ParameterError, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
@@ -103,7 +103,7 @@ def census(
     whole_number("finer", finer, least=0, most=_FINEST)
     whole_number("most_starts", most_starts, least=1)
     whole_number("seed", seed, least=0)
-    if period_of(model, vector) == 0.0:
+    if model.view(vector).period == 0.0:
         raise ParameterError(
             f"model '{model.name}' has no excitation: the periods of its orbits are unknown, and a "
             "census cannot be bounded by their number"
@@ -162,7 +162,7 @@ class _Census:
         sizes += [largest * 2.0**k for k in range(1, _DOUBLINGS + 1)]
         for reach in sizes:
             found = self._search(section, reach)
-            if found is None or (reach >= largest and found.farthest <= NEAR_ENOUGH * reach):
+            if found is None or (reach >= largest and found.done.farthest <= NEAR_ENOUGH * reach):
                 return
 
     def _search(self, section: Section, reach: float) -> Findings | None:
@@ -177,34 +177,18 @@ class _Census:
         try:
             found = searched(search, self.progress)
         except BaseException:
-            self._record(grid, mesh, search.findings())
+            self._record(grid, search.findings())
             raise
-        self._record(grid, mesh, found)
+        self._record(grid, found)
         return found
 
-    def _record(self, grid: Grid, mesh: Mesh, found: Findings) -> None:
+    def _record(self, grid: Grid, found: Findings) -> None:
         self.catalogue = found.catalogue
         for codes in found.walks:
             itinerary = grid.itinerary_of(codes)
             half = codes[-1] != grid.own
             self.followed.add(canonical_pair(self.model, whole_of(self.model, itinerary, half)))
-        self.searches.append(
-            SectionSearch(
-                str(grid.section),
-                grid.section.dimension,
-                0.5**mesh.coarse,
-                0.5 ** max(mesh.torn, mesh.near),
-                grid.reach if grid.section.dimension > 1 else 0.0,
-                found.farthest,
-                found.starts,
-                found.solves,
-                found.held,
-                found.cut,
-                found.jumps,
-                found.open,
-                found.complete,
-            )
-        )
+        self.searches.append(found.done)
 
     # ----------------------------------------------------------------------------------- result
 

@@ -21,7 +21,6 @@ from contfric.censuses.sections import (
     SectionSweep,
     dimension_of,
     joint_indices,
-    period_of,
     sweep_from,
 )
 from contfric.models.definition import Model
@@ -96,7 +95,7 @@ class Grid:
     @cached_property
     def period(self) -> float:
         """Period of the excitation."""
-        return period_of(self.model, self.vector)
+        return self.model.view(self.vector).period
 
     @cached_property
     def events(self) -> int:

@@ -37,6 +37,7 @@ from contfric.censuses.cells import (
 )
 from contfric.censuses.grid import Grid
 from contfric.censuses.orbits import Catalogue
+from contfric.censuses.result import SectionSearch
 from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
@@ -107,19 +108,23 @@ class Search:
 
     def findings(self) -> Findings:
         """Return what was found so far."""
-        grid = self.grid
-        return Findings(
-            self.catalogue.copy(),
-            tuple(grid.walked.values()),
-            grid.count,
-            grid.held,
-            grid.cut,
-            self.jumps,
-            self.open,
-            self.solves,
-            self.complete,
-            self.farthest,
+        grid, mesh, dimension = self.grid, self.mesh, self.grid.section.dimension
+        done = SectionSearch(
+            section=str(grid.section),
+            dimension=dimension,
+            first=0.5**mesh.coarse,
+            last=0.5 ** max(mesh.torn, mesh.near),
+            reach=grid.reach if dimension > 1 else 0.0,
+            farthest=self.farthest,
+            starts=grid.count,
+            solves=self.solves,
+            held=grid.held,
+            cut=grid.cut,
+            jumps=self.jumps,
+            open=self.open,
+            complete=self.complete,
         )
+        return Findings(self.catalogue.copy(), tuple(grid.walked.values()), done)
 
     @property
     def farthest(self) -> float:

@@ -15,7 +15,9 @@ basis of the directions that the section leaves free, over the box in which orbi
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,8 @@ from contfric.remember.journal import remembered
 from contfric.signature.reduced import ReducedPair
 from contfric.simulation.tables import tables
 
+#: Mode and exit of a segment, the mode after it, and the sign of the rate at which the exit is met.
+_End: TypeAlias = tuple[ReducedPair, str, float]
 #: Phases at which it is asked whether an exit can be met: an arc narrower than this part of a period
 #: may be missed.
 _PHASES = 4096
@@ -87,20 +91,24 @@ def dimension_of(model: Model, pair: ReducedPair) -> int:
 def sections_of(model: Model, vector: FloatArray) -> list[Section]:
     """Return the sections, one of each mirror pair, in the order of their dimension."""
     found: list[Section] = []
-    seen: set[tuple[ReducedPair, str, float]] = set()
+    seen: set[_End] = set()
+    for end in _ends(model):
+        if end not in seen:
+            seen |= {end, _mirrored(model, *end)}
+            found.append(_section(model, *end, vector))
+    return sorted(found, key=lambda section: section.dimension)
+
+
+def _ends(model: Model) -> Iterator[_End]:
+    """Yield how a segment may end: its mode and exit, the mode that follows, and the sense of the exit."""
     for pair in letters_of(model):
         for after in sorted(modes_after(model, pair)):
             domains = exit_domains(model, pair[0], pair[1], after)
             for sense in {-float(model.domain_by_name[d].signs[pair[1]]) for d in domains}:
-                if (pair, after, sense) not in seen:
-                    seen |= {(pair, after, sense), _mirrored(model, pair, after, sense)}
-                    found.append(_section(model, pair, after, sense, vector))
-    return sorted(found, key=lambda section: section.dimension)
+                yield pair, after, sense
 
 
-def _mirrored(
-    model: Model, pair: ReducedPair, after: str, sense: float
-) -> tuple[ReducedPair, str, float]:
+def _mirrored(model: Model, pair: ReducedPair, after: str, sense: float) -> _End:
     if model.symmetry is None:
         return pair, after, sense
     images = mirror_mode(model)
@@ -129,11 +137,6 @@ def _free_directions(
     rows = [flow.gradient(model.surfaces[k].observable, 0.0, np.zeros(n))[1:] for k in held]
     free = np.linalg.svd(np.array(rows))[2][len(held) :].T
     return np.ascontiguousarray(free[:, : dimension - 1])
-
-
-def period_of(model: Model, vector: FloatArray) -> float:
-    """Return the period of the excitation, 0 without one."""
-    return model.view(vector).period
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ def sweep_from(
     from contfric.censuses.sweep import sweep
 
     model, count = section.model, len(phases)
-    n, period = len(model.states), period_of(model, vector)
+    n, period = len(model.states), model.view(vector).period
     starts = np.ascontiguousarray(positions @ section.basis.T)
     joints = np.empty((count, events, 2), dtype=np.int64)
     cycles = np.zeros((count, events), dtype=np.int64)
@@ -231,14 +234,10 @@ def arcs_of(section: Section, vector: FloatArray) -> Arcs:
 
 def exit_arcs(model: Model, vector: FloatArray) -> dict[ReducedPair, Arcs]:
     """Return the arcs of every segment whose end is a section of dimension one."""
-    arcs: dict[ReducedPair, Arcs] = {}
-    for pair in letters_of(model):
-        if dimension_of(model, pair) != 1:
-            continue
-        found: list[tuple[float, float]] = []
-        for after in sorted(modes_after(model, pair)):
-            domains = exit_domains(model, pair[0], pair[1], after)
-            for sense in {-float(model.domain_by_name[d].signs[pair[1]]) for d in domains}:
-                found += arcs_of(_section(model, pair, after, sense, vector), vector)
-        arcs[pair] = tuple(sorted(found))
-    return arcs
+    arcs: dict[ReducedPair, list[tuple[float, float]]] = {
+        pair: [] for pair in letters_of(model) if dimension_of(model, pair) == 1
+    }
+    for pair, after, sense in _ends(model):
+        if pair in arcs:
+            arcs[pair] += arcs_of(_section(model, pair, after, sense, vector), vector)
+    return {pair: tuple(sorted(found)) for pair, found in arcs.items()}

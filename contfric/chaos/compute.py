@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 
 from contfric.base.arrays import FloatArray
 from contfric.base.memory import must_fit
-from contfric.chaos.exponents import checked_time, limits_of
+from contfric.chaos.exponents import limits_of
 from contfric.chaos.map import LyapunovMap, points_of
 from contfric.chaos.running import Progress, check_executor
 from contfric.chaos.starts import StateLike, given_states, number_of_starts
 from contfric.chaos.tiles import Tile, TileRows, compute_tile, empty_tile, inside, places
 from contfric.chaos.work import Work, put_rows
-from contfric.errors import ParameterError, function_of, shown, whole_number
+from contfric.errors import ParameterError, function_of, real_number, shown, whole_number
 from contfric.models import ModelSource
 from contfric.models.definition import Model
 from contfric.models.tied import tied
@@ -105,7 +105,7 @@ def lyapunov_map(
     states = None if state is None else _all_states(model, grid, vector, state, count)
     names, values = zip(*grid.items(), strict=True)
     varied = model.index_of(names[0]), model.index_of(names[1])
-    at = checked_time(time)
+    at = real_number("time", time)
     whole = Tile(model, limits, vector, varied, (values[0], values[1]), count, states, at)
     with kept_in(folder):
         rows = _computed(whole, tile, executor, progress)

@@ -146,17 +146,6 @@ def limits_of(transient: int, periods: int, tolerance: float, confirm: int) -> F
     return FollowingLimits(transient, periods, tolerance, confirm)
 
 
-def checked_time(time: float) -> float:
-    """Return an initial time.
-
-    Raises
-    ------
-    ParameterError
-        If it is not finite.
-    """
-    return real_number("time", time)
-
-
 def lyapunov_exponent(
     model: ModelSource,
     params: Parameters | None = None,
@@ -213,7 +202,7 @@ def lyapunov_exponent(
         states = given_states(model, state, named)
     if len(states) != 1:
         raise ParameterError(f"one state is followed, got {len(states)}: call once for each")
-    rows = follow(model, vector[None], states, checked_time(time), limits)
+    rows = follow(model, vector[None], states, real_number("time", time), limits)
     return LyapunovExponents(
         model,
         named,

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contfric.atlas.diagram import Diagram
 from contfric.atlas.plane.plane import Plane
+from contfric.base.arrays import FloatArray
 from contfric.base.tabled import Tabled
 from contfric.chaos.map import LyapunovMap
 from contfric.continuation.branch import Branch
@@ -57,17 +58,6 @@ class Columns:
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values()), ()))
-
-    def add(self, name: str, values: Any, unit: float | None = None) -> None:
-        """Append a column of numbers with a unit, or of texts."""
-        self.values[name] = np.asarray(values)
-        self.units[name] = "" if unit is None else f"{unit:g}"
-
-    def multipliers(self, values: Any) -> None:
-        """Append real and imaginary parts of multipliers, shape (rows, n)."""
-        for k, column in enumerate(np.asarray(values, dtype=np.complex128).T, start=1):
-            self.add(f"multiplier_{k}_re", column.real, 1.0)
-            self.add(f"multiplier_{k}_im", column.imag, 1.0)
 
 
 def stacked(tables: Sequence[Columns]) -> Columns:
@@ -135,12 +125,9 @@ def _events(x: Exported) -> Columns | None:
                 for node in x.events
             ]
         )
-    table = Columns()
-    special = x.special
-    table.add("label", np.array([point.name for point in special], dtype=np.str_))
-    for name in x.parameters:
-        table.add(name, [point.params[name] for point in special], 1.0)
-    return table
+    columns = {"label": np.array([point.name for point in x.special], dtype=np.str_)}
+    columns |= {name: np.array([p.params[name] for p in x.special]) for name in x.parameters}
+    return _table(columns, x.model)
 
 
 def _from_origins(table: Columns, model: Model) -> Columns:
@@ -154,12 +141,6 @@ def _from_origins(table: Columns, model: Model) -> Columns:
     return table
 
 
-def _lengths(model: Model) -> tuple[float, float]:
-    """Return the units of the displacement and of time."""
-    units = dict(model.units)
-    return units.get(model.states[0], 1.0), units.get("t", 1.0)
-
-
 def _table(
     columns: Mapping[str, Any],
     model: Model,
@@ -167,60 +148,65 @@ def _table(
     times: Sequence[str] = (),
 ) -> Columns:
     """Return the table of a result, with the units that the names of its columns tell."""
-    table, units, (length, time) = Columns(), dict(model.units), _lengths(model)
+    table, units = Columns(), dict(model.units)
+    length, time = units.get(model.states[0], 1.0), units.get("t", 1.0)
     units |= {"t": time, **dict.fromkeys(lengths, length), **dict.fromkeys(times, time)}
     for name, values in columns.items():
         column = np.asarray(values)
-        column = column.astype(np.str_) if column.dtype.kind == "O" else column
-        table.add(name, column, None if column.dtype.kind == "U" else units.get(name, 1.0))
+        table.values[name] = column.astype(np.str_) if column.dtype.kind == "O" else column
+        is_text = table.values[name].dtype.kind == "U"
+        table.units[name] = "" if is_text else f"{units.get(name, 1.0):g}"
     return table
+
+
+def _of_orbits(columns: Mapping[str, Any], model: Model) -> Columns:
+    """Return the table of orbits: their extrema and stops are lengths, their periods are times."""
+    stops = (name for name in columns if name.startswith("stop_"))
+    return _table(columns, model, ("x_max", "x_min", *stops), ("period",))
+
+
+def _multipliers(values: Any) -> dict[str, FloatArray]:
+    """Return real and imaginary parts of multipliers, shape (rows, n)."""
+    return {
+        f"multiplier_{k}_{part}": column.real if part == "re" else column.imag
+        for k, column in enumerate(np.asarray(values, dtype=np.complex128).T, start=1)
+        for part in ("re", "im")
+    }
+
+
+def _stability(event: Bifurcation | EquilibriumEvent) -> dict[str, list[float]]:
+    sides = {"stable_before": event.stable_before, "stable_after": event.stable_after}
+    return {name: [np.nan if side is None else float(side)] for name, side in sides.items()}
 
 
 def _motion(orbit: Orbit) -> Columns:
-    table, units = Columns(), dict(orbit.model.units)
     times, states, names = orbit.trajectory()
-    table.add("t", times, units.get("t", 1.0))
-    for k, name in enumerate(orbit.model.states):
-        table.add(name, states[:, k], units.get(name, 1.0))
-    table.add("domain", np.array(names, dtype=np.str_))
-    return table
+    own = dict(zip(orbit.model.states, states.T, strict=True))
+    return _table({"t": times, **own, "domain": np.array(names, dtype=np.str_)}, orbit.model)
 
 
 def _branch(branch: Branch, number: int) -> Columns:
-    table, (length, time) = Columns(), _lengths(branch.model)
-    table.add("branch", np.full(len(branch), number), 1.0)
-    table.add("signature", np.full(len(branch), branch.name))
-    for name, values in branch.params.items():
-        table.add(name, values, 1.0)
-    table.add("period", branch.period, time)
-    table.add("x_max", branch.x_max, length)
-    table.add("x_min", branch.x_min, length)
-    table.add("psi", branch.asymmetry, 1.0)
-    for k, stops in enumerate(branch.stops.T, start=1):
-        table.add(f"stop_{k}", stops, length)
+    count = len(branch)
+    columns: dict[str, Any] = {"branch": np.full(count, number), "signature": [branch.name] * count}
+    columns |= {**branch.params, "period": branch.period}
+    columns |= {"x_max": branch.x_max, "x_min": branch.x_min, "psi": branch.asymmetry}
+    columns |= {f"stop_{k}": stops for k, stops in enumerate(branch.stops.T, start=1)}
     if branch.stable is not None:
-        table.add("stable", branch.stable.astype(np.float64), 1.0)
+        columns["stable"] = branch.stable.astype(np.float64)
     if branch.multipliers is not None:
-        table.multipliers(branch.multipliers)
-    return table
+        columns |= _multipliers(branch.multipliers)
+    return _of_orbits(columns, branch.model)
 
 
 def _event(event: Bifurcation, branches: Sequence[str], names: Sequence[str]) -> Columns:
-    table, (length, time) = Columns(), _lengths(event.orbit.model)
-    table.add("label", [event.label])
-    table.add("kind", [event.kind.value])
-    table.add("branches", [" ".join(branches)])
-    table.add("signatures", ["; ".join(names)])
-    for name, value in event.params.items():
-        table.add(name, [value], 1.0)
-    table.add("period", [event.orbit.period], time)
-    table.add("x_max", [event.orbit.x_max], length)
-    for name in ("stable_before", "stable_after"):
-        stable = getattr(event, name)
-        table.add(name, [np.nan if stable is None else float(stable)], 1.0)
-    if not event.orbit.system.holds:
-        table.multipliers(event.orbit.multipliers[None, :])
-    return table
+    orbit = event.orbit
+    columns: dict[str, Any] = {"label": [event.label], "kind": [event.kind.value]}
+    columns |= {"branches": [" ".join(branches)], "signatures": ["; ".join(names)]}
+    columns |= {name: [value] for name, value in event.params.items()}
+    columns |= {"period": [orbit.period], "x_max": [orbit.x_max], **_stability(event)}
+    if not orbit.system.holds:
+        columns |= _multipliers(orbit.multipliers[None, :])
+    return _of_orbits(columns, orbit.model)
 
 
 def _equilibria(branch: EquilibriumBranch, number: int) -> Columns:
@@ -234,24 +220,15 @@ def _event_at_rest(event: EquilibriumEvent) -> Columns:
     columns: dict[str, Any] = {"label": [event.label], "kind": [event.kind.value]}
     columns |= {name: [value] for name, value in event.params.items()}
     columns |= {name: [value] for name, value in zip(model.states, rest.state, strict=True)}
-    for name in ("stable_before", "stable_after"):
-        stable = getattr(event, name)
-        columns[name] = [np.nan if stable is None else float(stable)]
-    return _table(columns, model)
+    return _table(columns | _stability(event), model)
 
 
 def _curve(curve: Curve, number: int) -> Columns:
-    table, (length, time) = Columns(), _lengths(curve.model)
-    orbits = list(curve)
-    table.add("curve", np.full(len(curve), number), 1.0)
-    table.add("label", np.full(len(curve), curve.label))
-    table.add("kind", [kind.value for kind in curve.kinds])
-    for name, values in curve.params.items():
-        table.add(name, values, 1.0)
-    table.add("period", [orbit.period for orbit in orbits], time)
-    table.add("x_max", [orbit.x_max for orbit in orbits], length)
-    table.add("x_min", [orbit.x_min for orbit in orbits], length)
-    table.add("stable", curve.stable.astype(np.float64), 1.0)
+    count, orbits = len(curve), list(curve)
+    columns: dict[str, Any] = {"curve": np.full(count, number), "label": [curve.label] * count}
+    columns |= {"kind": [kind.value for kind in curve.kinds], **curve.params}
+    columns |= {name: [getattr(o, name) for o in orbits] for name in ("period", "x_max", "x_min")}
+    columns["stable"] = curve.stable.astype(np.float64)
     if not any(orbit.system.holds for orbit in orbits):
-        table.multipliers(np.array([orbit.multipliers for orbit in orbits]))
-    return table
+        columns |= _multipliers(np.array([orbit.multipliers for orbit in orbits]))
+    return _of_orbits(columns, curve.model)

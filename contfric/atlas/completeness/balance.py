@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.arrays import with_entries
 from contfric.atlas.leaving.short_branches import is_short
 from contfric.atlas.matching import ROUNDING, guesses, same_event, same_location
+from contfric.base.arrays import with_entries
 from contfric.bvp.conserved import conserved
 from contfric.bvp.margins import EventFunction
 from contfric.continuation.branch import Branch

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from contfric.base.arrays import with_entries
 from contfric.atlas.completeness.balance import Balance, IndexSum, balances, index_sums
 from contfric.atlas.completeness.degenerate import (
     Degenerate,
@@ -36,6 +35,7 @@ from contfric.atlas.matching import (
     on_branch,
     same_location,
 )
+from contfric.base.arrays import with_entries
 from contfric.base.one_thread import one_thread
 from contfric.continuation.branch import Branch
 from contfric.continuation.points import LARGEST_STEP
