@@ -22,6 +22,8 @@ TERMS, STEP = 70, 0.5
 #: Differences for derivatives.
 SMALL = mpf(10) ** -25
 SAMPLES = 60
+#: Segments of the model.
+PAIRS = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
 
 
 def _mpf(x: arb) -> mpf:
@@ -278,10 +280,9 @@ def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 def _other_segment(data: dict[str, Any], rng: np.random.Generator) -> None:
-    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     i = int(rng.integers(len(data["segments"])))
     if rng.uniform() < 0.5 or len(data["segments"]) == 1:
-        data["segments"][i] = kinds[int(rng.integers(4))]
+        data["segments"][i] = [*PAIRS[int(rng.integers(4))]]
         return
     del data["segments"][i]
     for name in ("joints", "radius", "enclosure"):
@@ -294,7 +295,7 @@ def _turned(data: dict[str, Any], rng: np.random.Generator) -> None:
         data[name] = data[name][2:] + data[name][:2]
 
 
-def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
+def other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
     if rng.uniform() < 0.5:
         data["half"] = not data["half"]
     else:
@@ -381,9 +382,8 @@ def _later(data: dict[str, Any], rng: np.random.Generator) -> None:
 def _one_more(data: dict[str, Any], rng: np.random.Generator) -> None:
     """Cut a segment in two, or put one of no length between two."""
     i = int(rng.integers(len(data["segments"])))
-    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     own = data["segments"][i]
-    data["segments"].insert(i, own if rng.uniform() < 0.5 else kinds[int(rng.integers(4))])
+    data["segments"].insert(i, own if rng.uniform() < 0.5 else [*PAIRS[int(rng.integers(4))]])
     here = data["joints"][2 * i :][:2]
     there = data["joints"][2 * i + 2 :][:2] or here
     share = float(rng.choice([0.0, 1e-9, 0.5]))
@@ -422,5 +422,5 @@ def _less(data: dict[str, Any], rng: np.random.Generator) -> None:
 _CHANGES = (
     *(_mirrored, _later, _one_more, _backwards, _exchanged, _less),
     *(_move_joint, _shrink, _move_ball, _move_disc, _other_side, _other_params, _other_segment),
-    *(_turned, _other_turn, _copied, _ball_for_a_parameter, _no_number, _inverted),
+    *(_turned, other_turn, _copied, _ball_for_a_parameter, _no_number, _inverted),
 )

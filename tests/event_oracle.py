@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from tests.certificate_oracle import DIGITS, Truth, ball
-from tests.tube_oracle import solved
+from tests.certificate_oracle import DIGITS, PAIRS, Truth, ball, other_turn
+from tests.tube_oracle import other_params, solved
 
 #: How far to each side of the ball: multipliers are differences that are known to 1e-22.
 BESIDE = mpf(10) ** -18
@@ -151,11 +151,6 @@ def _move_knot(data: dict[str, Any], rng: np.random.Generator) -> None:
         knot[k] = _text(centre + rng.choice([-1, 1]) * mpf(10) ** rng.uniform(-35, 0), radius)
 
 
-def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
-    names = [name for name in data["params"] if name != data["parameter"]]
-    data["params"][str(rng.choice(names))] += rng.choice([-1, 1]) * 10 ** rng.uniform(-14, -1)
-
-
 def _other_kind(data: dict[str, Any], rng: np.random.Generator) -> None:
     data["kind"] = str(rng.choice(["SN", "PD", "BP", "NS", "CS", "SS", "AS", "T"]))
     if data["at"] is None and rng.uniform() < 0.5:
@@ -167,21 +162,13 @@ def _other_stop(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 def _other_segment(data: dict[str, Any], rng: np.random.Generator) -> None:
-    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     i = int(rng.integers(len(data["segments"])))
     if rng.uniform() < 0.5 or len(data["segments"]) == 1:
-        data["segments"][i] = kinds[int(rng.integers(4))]
+        data["segments"][i] = [*PAIRS[int(rng.integers(4))]]
     else:
         del data["segments"][i]
         for knot in data["knots"]:
             del knot[2 * i : 2 * i + 2]
-
-
-def _other_turn(data: dict[str, Any], rng: np.random.Generator) -> None:
-    if rng.uniform() < 0.5:
-        data["half"] = not data["half"]
-    else:
-        data["periods"] += 1
 
 
 def _other_parameter(data: dict[str, Any], rng: np.random.Generator) -> None:
@@ -192,6 +179,6 @@ def _other_parameter(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 _CHANGES = (
-    *(_move_value, _other_params, _other_kind, _other_stop, _other_segment, _other_turn),
+    *(_move_value, other_params, _other_kind, _other_stop, _other_segment, other_turn),
     *(_other_parameter, _move_knot),
 )

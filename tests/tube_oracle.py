@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from mpmath import mp, mpf
 
-from tests.certificate_oracle import DIGITS, SMALL, Truth
+from tests.certificate_oracle import DIGITS, PAIRS, SMALL, Truth
 
 #: Orbits between two knots at which signs are looked at.
 BETWEEN = 1
@@ -176,7 +176,7 @@ def _other_end(data: dict[str, Any], rng: np.random.Generator) -> None:
         ends[k] = [str(rng.choice(["CS", "SS"])), [at]]
 
 
-def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
+def other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
     names = [name for name in data["params"] if name != data["parameter"]]
     data["params"][str(rng.choice(names))] += float(
         rng.choice([-1, 1]) * 10 ** rng.uniform(-14, -1)
@@ -184,10 +184,9 @@ def _other_params(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 def _other_itinerary(data: dict[str, Any], rng: np.random.Generator) -> None:
-    kinds = [["slide+", "v"], ["slide-", "v"], ["stick", "F+"], ["stick", "F-"]]
     way = rng.uniform()
     if way < 0.4:
-        data["segments"][int(rng.integers(len(data["segments"])))] = kinds[int(rng.integers(4))]
+        data["segments"][int(rng.integers(len(data["segments"])))] = [*PAIRS[int(rng.integers(4))]]
     elif way < 0.6:
         data["segments"] = [*data["segments"][1:], data["segments"][0]]
     elif way < 0.8:
@@ -197,6 +196,6 @@ def _other_itinerary(data: dict[str, Any], rng: np.random.Generator) -> None:
 
 
 _CHANGES = (
-    *(_move_number, _other_knots, _other_events, _other_end, _other_params, _other_itinerary),
+    *(_move_number, _other_knots, _other_events, _other_end, other_params, _other_itinerary),
     _other_events,
 )

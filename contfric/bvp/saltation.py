@@ -22,8 +22,9 @@ from itertools import islice
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.bvp.assembly import following_modes
 from contfric.bvp.passages import Passage, fields_between, passage_at
-from contfric.bvp.system import System, following_modes
+from contfric.bvp.system import System
 from contfric.models.view import FlowView
 from contfric.signature.holds import is_hold
 

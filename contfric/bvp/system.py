@@ -31,19 +31,12 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.attributes import cached_property
-from contfric.bvp.assembly import Assembly, following_modes
+from contfric.bvp.assembly import Assembly
 from contfric.bvp.conserved import conserved, kept_by
 from contfric.bvp.holds import Hold
 from contfric.bvp.margins import EventFunction, Margin
 from contfric.bvp.segment_starts import Itinerary, beginnings
 from contfric.models.definition import Model
-from contfric.models.mode_domains import (
-    exit_domains,
-    inside_sign,
-    mirror_mode,
-    mode_bounds,
-    mode_domains,
-)
 from contfric.remember.stored import made_of
 
 __all__ = [
@@ -53,12 +46,6 @@ __all__ = [
     "Margin",
     "System",
     "build_system",
-    "exit_domains",
-    "following_modes",
-    "inside_sign",
-    "mirror_mode",
-    "mode_bounds",
-    "mode_domains",
 ]
 
 

@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from contfric.bvp.system import inside_sign
 from contfric.models.definition import Model
+from contfric.models.mode_domains import inside_sign
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show
 from contfric.signature.reduced import ReducedPair

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray, IntArray
-from contfric.bvp.system import mirror_mode
 from contfric.censuses.itineraries import is_stop, letters_of, modes_after
 from contfric.censuses.sections import (
     Section,
@@ -24,6 +23,7 @@ from contfric.censuses.sections import (
     sweep_from,
 )
 from contfric.models.definition import Model
+from contfric.models.mode_domains import mirror_mode
 from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.signature import ReducedItinerary
 from contfric.simulation.simulate import SimulationEnd

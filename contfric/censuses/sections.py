@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.tally import tally
-from contfric.bvp.system import exit_domains, mirror_mode
 from contfric.censuses.conditions import Arcs
 from contfric.censuses.itineraries import letters_of, modes_after
 from contfric.models.definition import Model
+from contfric.models.mode_domains import exit_domains, mirror_mode
 from contfric.remember.journal import remembered
 from contfric.signature.reduced import ReducedPair
 from contfric.simulation.tables import tables

@@ -36,7 +36,7 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.holds import Hold
-from contfric.bvp.system import EventFunction, Margin, System, inside_sign
+from contfric.bvp.system import EventFunction, Margin, System
 from contfric.events.bifurcation import Kind
 from contfric.events.local.jumps import nothing_jumps
 from contfric.events.local.touching import (
@@ -50,6 +50,7 @@ from contfric.events.local.touching import (
     touched_at_joint,
 )
 from contfric.models.definition import Domain, Model
+from contfric.models.mode_domains import inside_sign
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest
 

@@ -34,8 +34,9 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.linear import jacobian_blocks
-from contfric.bvp.system import System, inside_sign
+from contfric.bvp.system import System
 from contfric.models.definition import Model
+from contfric.models.mode_domains import inside_sign
 from contfric.models.view import FlowView
 from contfric.orbit.orbit import Orbit
 

@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from contfric.base.counts import Counts
 from contfric.base.files import replacing
+from contfric.base.tally import Counts
 from contfric.study.plan import Plan
 from contfric.study.tasks.task import Found
 

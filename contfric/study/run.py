@@ -15,8 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from contfric.base.counts import Counts, counts
 from contfric.base.files import remove_leftovers, unwritable
+from contfric.base.tally import Counts, counts
 from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.results import save
 from contfric.study.checkpoint import Checkpoint, check_unfinished, checkpoint_in, goes_on, key_of

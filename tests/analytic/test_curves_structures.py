@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import slip, slower_than_the_belt
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
@@ -77,13 +77,6 @@ def some(found: cf.Curve, count: int = 12) -> list[int]:
 
 def point_of(found: cf.Curve, name: str) -> cf.SpecialPoint:
     return next(s for s in found.special if s.name == name)
-
-
-def integrated(f: Any, y0: Any, span: tuple[float, float], until: Any = None) -> np.ndarray:
-    if until is not None:
-        until.terminal = True
-    done = solve_ivp(f, span, y0, method="DOP853", rtol=2.5e-14, atol=1e-15, events=until)
-    return done.y_events[0][0] if until is not None else done.y[:, -1]
 
 
 # ------------------------------------------------------------------- impacts: closed forms
@@ -248,21 +241,9 @@ def arc_at(found: cf.Curve, force: float) -> float:
     return float(brentq(place, found.arc[0], found.arc[-1], xtol=1e-14))
 
 
-def popp_turn(start: Any, omega: float, force: float, begin: float = 0.0) -> np.ndarray:
-    """Return the state and tangent map after two periods of motion slower than the belt."""
-
-    def f(t: float, y: np.ndarray) -> list[float]:
-        z = 1.0 - y[1]
-        rate, slope = 1.5 - 1.5 * z + 0.45 * z**3, 1.5 - 1.35 * z * z
-        tangent = y[2:].reshape(2, 2)
-        grown = np.array([tangent[1], slope * tangent[1] - tangent[0]])
-        return [y[1], rate - y[0] + force * cos(omega * t), *grown.ravel()]
-
-    return integrated(f, [*start, 1, 0, 0, 1], (begin, begin + 4 * pi / omega))
-
-
 def doubled(start: Any, omega: float, force: float, begin: float = 0.0) -> list[float]:
-    end = popp_turn(start, omega, force, begin)
+    """Miss the start, and the multiplier -1, after two periods of motion slower than the belt."""
+    end = slower_than_the_belt(start, omega, (begin, begin + 4 * pi / omega), force)
     return [*(end[:2] - start), np.linalg.det(end[2:].reshape(2, 2) + np.eye(2))]
 
 
@@ -320,18 +301,6 @@ def test_popp_grazing_is_one_curve_in_two_itineraries() -> None:
     for i in some(b):
         orbit = b[i]
         assert crossing(a, orbit.params["F"]) == pytest.approx(orbit.params["omega"], abs=2e-7)
-
-
-def slip(vb: float, delta: float, x: float, side: float) -> float:
-    """Return x where the belt's speed is met again; side is that of x' - vb."""
-
-    def f(_: float, y: np.ndarray) -> list[float]:
-        return [y[1], -y[0] - side / (1 + delta * side * (y[1] - vb))]
-
-    def met(t: float, y: np.ndarray) -> float:
-        return float(y[1] - vb) if t > 1e-3 else side
-
-    return float(integrated(f, [x, vb], (0, 20), met)[0])
 
 
 def test_belt_by_another_integrator() -> None:

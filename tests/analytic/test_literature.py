@@ -16,7 +16,7 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import integrated, slip, slower_than_the_belt
 from scipy.optimize import brentq, fsolve, root
 
 import contfric as cf
@@ -40,14 +40,6 @@ def value(name: str, kind: str, near: float) -> float:
     found = diagram(name)
     values = [e.params[found.parameter] for e in found.bifurcations if e.kind.value == kind]
     return min(values, key=lambda v: abs(v - near))
-
-
-def integrated(f: Any, y0: Any, span: tuple[float, float], until: Any = None) -> np.ndarray:
-    """Return the state at the end of a span, or at the first event, by scipy."""
-    if until is not None:
-        until.terminal = True
-    done = solve_ivp(f, span, y0, method="DOP853", rtol=2.5e-14, atol=1e-15, events=until)
-    return done.y_events[0][0] if until is not None else done.y[:, -1]
 
 
 class DeadBand:
@@ -135,26 +127,10 @@ def test_impact_oscillator_in_closed_form() -> None:
     assert float(fold) == pytest.approx(0.0041115306, abs=1e-10)
 
 
-class Belt:
-    """Slips of the block from the belt's speed back to it."""
-
-    @staticmethod
-    def slip(vb: float, x: float, side: float) -> float:
-        """Return x where the belt's speed is met again; side is that of x' - vb."""
-
-        def f(_: float, y: np.ndarray) -> list[float]:
-            return [y[1], -y[0] - side / (1 + 3 * side * (y[1] - vb))]
-
-        def met(t: float, y: np.ndarray) -> float:
-            return float(y[1] - vb) if t > 1e-3 else -side * -1.0
-
-        return float(integrated(f, [x, vb], (0, 20), met)[0])
-
-
 def test_belt_by_another_integrator() -> None:
-    ss = brentq(lambda vb: Belt.slip(vb, 1.0, -1.0) + 1.0, 0.6, 0.7, xtol=1e-13)
+    ss = brentq(lambda vb: slip(vb, 3.0, 1.0, -1.0) + 1.0, 0.6, 0.7, xtol=1e-13)
     assert value("belt", "SS", 0.64) == pytest.approx(ss, abs=1e-10)
-    cs = brentq(lambda v: Belt.slip(v, Belt.slip(v, 1.0, -1.0), 1.0) - 1.0, 4.3, 4.5, xtol=1e-13)
+    cs = brentq(lambda v: slip(v, 3.0, slip(v, 3.0, 1.0, -1.0), 1.0) - 1.0, 4.3, 4.5, xtol=1e-13)
     assert value("belt", "CS", 4.42) == pytest.approx(cs, abs=1e-10)
 
 
@@ -163,29 +139,16 @@ def test_cycle_of_the_belt() -> None:
     orbit = cf.find_orbit("belt", {"vb": 0.2})
     (stick,) = [k for k, (mode, _) in enumerate(orbit.itinerary) if mode == "stick"]
     lasts = orbit.ends[stick, 0] - orbit.begins[stick, 0]
-    assert lasts == pytest.approx((1.0 - Belt.slip(0.2, 1.0, -1.0)) / 0.2, abs=1e-9)
+    assert lasts == pytest.approx((1.0 - slip(0.2, 3.0, 1.0, -1.0)) / 0.2, abs=1e-9)
     assert orbit.period == pytest.approx(12.00103129483, abs=1e-10)
     fast = cf.continue_orbit(cf.find_orbit("belt", {"vb": 10.0}), "vb", (5.0, 60.0))
     assert [end.reason for end in fast.ends] == [cf.EndReason.RANGE] * 2
     assert fast.name == "0a, 8seg" and bool(np.all(fast.stable))
 
 
-def _popp(omega: float, y: np.ndarray, t: float) -> list[float]:
-    """Return the rates of slower motion than the belt's, with its tangent map."""
-    z = 1.0 - y[1]
-    rate, slope = (1.5 - 1.5 * z + 0.45 * z**3), 1.5 - 1.35 * z * z
-    tangent = y[2:].reshape(2, 2)
-    grown = np.array([tangent[1], slope * tangent[1] - tangent[0]])
-    return [y[1], rate - y[0] + 0.1 * cos(omega * t), *grown.ravel()]
-
-
 def test_popp_grazing_and_doubling_by_another_integrator() -> None:
     def after(omega: float, t: float, state: Any, turns: int) -> np.ndarray:
-        return integrated(
-            lambda s, y: _popp(omega, y, s),
-            [*state, 1, 0, 0, 1],
-            (t, t + 2 * pi * turns / omega),
-        )
+        return slower_than_the_belt(state, omega, (t, t + 2 * pi * turns / omega))
 
     def grazes(u: Any) -> list[float]:
         """It touches the belt's speed from below, without acceleration; closed after four periods."""
@@ -221,7 +184,7 @@ def test_popp_grazing_of_period_one() -> None:
     def grazes(u: Any) -> np.ndarray:
         start = np.array([1.5 + 0.1 * cos(u[1] * u[0]), 1.0])
         span = (u[0], u[0] + 2 * pi / u[1])
-        end = integrated(lambda s, y: _popp(u[1], y, s), [*start, 1, 0, 0, 1], span)
+        end = slower_than_the_belt(start, u[1], span)
         return end[:2] - start
 
     assert omega == pytest.approx(fsolve(grazes, [top, omega + 1e-6], xtol=1e-13)[1], abs=1e-9)
@@ -238,7 +201,7 @@ def test_popp_of_period_one_folds_and_becomes_a_torus() -> None:
     (torus,) = found.of_kind("NS")
     omega, start = torus.params["omega"], torus.orbit.state(0.0)
     period = 2 * pi / omega
-    end = integrated(lambda s, y: _popp(omega, y, s), [*start, 1, 0, 0, 1], (0.0, period))
+    end = slower_than_the_belt(start, omega, (0.0, period))
     assert end[:2] == pytest.approx(start, abs=1e-9)
     pair = np.linalg.eigvals(end[2:].reshape(2, 2))
     assert np.abs(pair) == pytest.approx([1.0, 1.0], abs=1e-8) and abs(pair[0].imag) > 0.1

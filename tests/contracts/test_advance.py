@@ -16,8 +16,7 @@ import contfric as cf
 from contfric.atlas.collect import Event
 from contfric.atlas.leaving import departures
 from contfric.atlas.leaving.departures import foresee_departures
-from contfric.base.counts import Counts, counts
-from contfric.base.tally import tally
+from contfric.base.tally import Counts, counts, tally
 from contfric.events.bifurcation import Kind
 from contfric.remember import advance
 from contfric.remember.advance import foresee, foreseeable, heed, in_advance

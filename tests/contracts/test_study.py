@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.base.counts import counts
+from contfric.base.tally import counts
 from contfric.events.bifurcation import End, EndReason
 from contfric.study import UnwrittenError, make_plan, read_study, study_names
 from contfric.study.result import RunStatus

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.bvp.assembly import following_modes
 from contfric.bvp.passages import Passage, passage_at
-from contfric.bvp.system import following_modes
 
 CONTACTS = 3
 

@@ -6,36 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rubbing_row import ten_contacts
 
 import contfric as cf
-from contfric.bvp.system import inside_sign
 from contfric.events.bifurcation import ACCURACY
 from contfric.events.incident.incident import incident_forms
 from contfric.events.local.zero_acceleration import only_comes_back
+from contfric.models.mode_domains import inside_sign
 
 SAMPLES = 2001
-
-
-def ten_contacts(seed: int) -> cf.Model:
-    """Return twenty random masses in a row, ten of which rub on the ground."""
-    draw = np.random.default_rng(seed)
-    beside = np.diag(draw.uniform(0.6, 1.4, 19) * 0.5, 1)
-    beside = beside + beside.T
-    stiffness = np.diag(draw.uniform(0.8, 1.2, 20) + beside.sum(axis=1)) - beside
-    mass = np.diag(draw.uniform(0.8, 1.2, 20))
-    rubs = {}
-    for k, i in enumerate(np.sort(draw.choice(np.arange(1, 21), 10, replace=False)), start=1):
-        kinetic = f"{draw.uniform(0.5, 1.5):.4f}*S"
-        rubs[f"b{k}"] = {"kind": "friction", "velocity": f"v{i}", "kinetic": kinetic}
-    return cf.Mechanism(
-        mass,
-        0.02 * stiffness,
-        stiffness,
-        contacts=rubs,
-        force={"q1": "cos(Omega*t)"},
-        parameters={"Omega": 1.0, "S": 0.03},
-        period="2*pi/Omega",
-    )
 
 
 def heights(orbit: cf.Orbit, i: int, surface: str, sign: int) -> Any:

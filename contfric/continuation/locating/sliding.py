@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contfric.bvp.system import EventFunction, Margin, inside_sign
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.half_branch import point_before
 from contfric.continuation.located_event import bifurcation_at
 from contfric.continuation.locating.change_of_sign import locate_change
@@ -17,6 +17,7 @@ from contfric.events.local.jumps import nothing_jumps
 from contfric.events.local.touching import is_rate_of
 from contfric.events.outcomes.standing_slides import goes_nowhere
 from contfric.events.sliding_kinds import bends_outward, hold_of_test, kind_of_margin
+from contfric.models.mode_domains import inside_sign
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest, is_hold
 

@@ -15,8 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.base.interrupts import whole
+from contfric.bvp.assembly import following_modes
 from contfric.bvp.passages import Passage, passage_at
-from contfric.bvp.system import EventFunction, Margin, following_modes
+from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.points import Point
 from contfric.curves.points import first_curve_point, solve_point
 from contfric.curves.problem import Problem

@@ -13,9 +13,10 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import cached_property
-from contfric.bvp.system import Itinerary, build_system, mirror_mode
+from contfric.bvp.system import Itinerary, build_system
 from contfric.errors import NotationError
 from contfric.models.definition import Model
+from contfric.models.mode_domains import mirror_mode
 from contfric.orbit.canonical.slides import (
     SAME_SOLUTION,
     repeats,

@@ -13,8 +13,8 @@ from functools import cache, lru_cache
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.bvp.system import mode_domains
 from contfric.models.definition import Model
+from contfric.models.mode_domains import mode_domains
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import ends_rest, left_surface, release_mode
 

@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.bvp.system import inside_sign
 from contfric.errors import NotationError
 from contfric.events.local.jumps import left_to, nothing_jumps
+from contfric.models.mode_domains import inside_sign
 from contfric.orbit.measured.samples import state_within, stationary_within
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import is_hold
