@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,10 @@ from measuring import Case, Row, measure
 from page import duration
 
 import contfric as cf
+from contfric.base.files import write_csv
 from contfric.study.drawings import draw as draw_figure
 from contfric.study.read import Study, read_study
-from contfric.study.tables import points, write_table
+from contfric.study.tables import points
 
 #: Rounds of points and quantities, of which multipliers are a few percent, and of figures: half a second.
 ROUNDS, OF_FIGURES = 25, 5
@@ -75,7 +77,8 @@ def counted(call: Callable[[], cf.Branch]) -> tuple[cf.Branch, str]:
 
 def wrote(path: Path, study: Study, branch: cf.Branch) -> tuple[None, str]:
     """The table of points of a branch."""
-    write_table(path, *points(study, (replace(branch),)))
+    table = points(study, (replace(branch),))
+    write_csv(path, chain([table.header], table.rows))
     return None, f"{path.stat().st_size / len(branch):.0f} bytes a point"
 
 

@@ -53,7 +53,7 @@ from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit
 from contfric.signature import canonical_itinerary
-from contfric.signature.edits import show
+from contfric.signature.walks import show
 
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3

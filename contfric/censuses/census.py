@@ -29,7 +29,7 @@ from contfric.models.definition import Model
 from contfric.models.tied import tied
 from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.signature import ReducedItinerary
-from contfric.signature.edits import show
+from contfric.signature.walks import show
 
 #: Cells of a curve: 4096 a period at first (0.02 s for ten events); where itineraries differ
 #: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.

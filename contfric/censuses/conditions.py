@@ -19,8 +19,8 @@ from enum import Enum
 from contfric.models.definition import Model
 from contfric.models.mode_domains import inside_sign
 from contfric.signature import ReducedItinerary
-from contfric.signature.edits import show
 from contfric.signature.reduced import ReducedPair
+from contfric.signature.walks import show
 
 #: Phases (in periods; the first from 0 to 1) at which an exit can be met: open arcs (first, last).
 Arcs = tuple[tuple[float, float], ...]

@@ -18,8 +18,8 @@ from contfric.models.definition import Model
 from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.signature import ReducedItinerary
 from contfric.signature.cyclic import least_rotation, rotated
-from contfric.signature.edits import entered, show
 from contfric.signature.reduced import ReducedPair, fuses
+from contfric.signature.walks import entered, show
 
 
 @cache

@@ -89,7 +89,7 @@ def _normal_form(region: ModeRegion, y: FloatArray, p: FloatArray, active: int) 
     fields = region.fields
     a = fields.jacobian(y, p)
     values, vectors = np.linalg.eig(a)
-    k = _critical(values, region.eigenvalues(y, p))
+    k = _critical(values, region.fields.eigenvalues(y, p))
     omega, q = float(values[k].imag), vectors[:, k] / np.linalg.norm(vectors[:, k])
     lefts, adjoint = np.linalg.eig(a.T)
     r = adjoint[:, int(np.argmin(np.abs(lefts + 1j * omega)))]

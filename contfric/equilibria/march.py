@@ -171,7 +171,7 @@ def crossings(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSi
 
 
 def _eigenvalues(arc: Arc, point: CurvePoint) -> np.ndarray:
-    return np.asarray(arc.region.eigenvalues(*arc.at(point)))
+    return np.asarray(arc.region.fields.eigenvalues(*arc.at(point)))
 
 
 def _pairs(arc: Arc, before: CurvePoint, after: CurvePoint) -> list[LocatedSignChange]:

@@ -16,17 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.models.definition import (
-    Constraint,
-    Departure,
-    Domain,
-    Mode,
-    Model,
-    Observable,
-    Parameter,
-    Surface,
-    Symmetry,
-)
+from contfric.models.definition import Domain, Model, Surface
+from contfric.models.parts import Constraint, Departure, Mode, Observable, Parameter, Symmetry
 
 if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow

@@ -58,18 +58,7 @@ if TYPE_CHECKING:
     from contfric.models.described.description import Description
     from contfric.models.view import FlowView
 
-__all__ = [
-    "Constraint",
-    "Departure",
-    "Domain",
-    "Mode",
-    "Model",
-    "Observable",
-    "Parameter",
-    "Reset",
-    "Surface",
-    "Symmetry",
-]
+__all__ = ["Domain", "Model", "Surface"]
 
 #: A parameter with a smaller default is compared with its default: 1 is far from all its values.
 _SMALL = 0.02

@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from contfric.errors import did_you_mean
+
 SUFFIXES = (".yaml", ".yml")
 
 
@@ -29,6 +31,22 @@ def not_a_file(name: str) -> str:
     if Path(name).suffix:
         return f"A file needs the suffix {' or '.join(SUFFIXES)}"
     return f"A file needs its suffix: {name}{SUFFIXES[0]}"
+
+
+def no_file(path: Path, what: str) -> str:
+    """Return why a path is not that of a YAML file that can be read; empty if it is.
+
+    Examples
+    --------
+    >>> no_file(Path("."), "a model")
+    '. is a folder; give the YAML file of a model'
+    """
+    if path.is_file():
+        return ""
+    if path.is_dir():
+        return f"{path} is a folder; give the YAML file of {what}"
+    near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    return f"there is no file {path}{did_you_mean(path.name, sorted(near)) if near else ''}"
 
 
 def relative_name(name: str, file: Path) -> str | Path:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from itertools import chain
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 
-from contfric.base.files import replacing
+from contfric.base.files import replacing, write_csv
 from contfric.errors import ParameterError, path_of
 from contfric.orbit.orbit import Orbit
 from contfric.results.columns import Columns, Exported, events_of, points_of
@@ -74,10 +73,8 @@ def _check_kind(x: object) -> None:
 
 def _write_csv(path: Path, table: Columns) -> None:
     rows = zip(*(values.tolist() for values in table.values.values()), strict=True)
-    units = (table.units[name] for name in table.values)
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerows(chain([list(table.values), list(units)], rows))
+    units = [table.units[name] for name in table.values]
+    write_csv(path, chain([list(table.values), units], rows))
 
 
 def _write_mat(path: Path, x: Exported, points: Columns, events: Columns | None) -> None:

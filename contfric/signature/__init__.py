@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from contfric.base.lazy import lazily
-from contfric.signature.edits import double, is_closed_walk, swap_stops
+from contfric.signature.edits import double, swap_stops
 from contfric.signature.graph import crossing, successors, transition_graph
 from contfric.signature.library import signature_names, signature_path
 from contfric.signature.notation import Signature, parse_signature
@@ -24,6 +24,7 @@ from contfric.signature.reduced import (
     reduce_signature,
     reduced_itinerary,
 )
+from contfric.signature.walks import is_closed_walk
 
 if TYPE_CHECKING:
     from contfric.signature.schema import SignatureFile as SignatureFile

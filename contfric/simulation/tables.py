@@ -16,10 +16,10 @@ import numpy as np
 
 from contfric.base.arrays import IntArray
 from contfric.errors import ModelError, ParameterError
-from contfric.models.definition import Domain, Mode, Model, Surface
+from contfric.models.definition import Domain, Model, Surface
 from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
-from contfric.models.parts import MOST_SURFACES
+from contfric.models.parts import MOST_SURFACES, Mode
 
 #: What a surface is in ``Tables.bounds`` to a mode in which it has a reset.
 MAPPED = 2

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from contfric.atlas.diagram import Diagram
+from contfric.base.files import write_csv
 from contfric.continuation.branch import Branch
 from contfric.errors import ResultFileError
 from contfric.results import load
 from contfric.study.plan import CERTIFICATE
-from contfric.study.tables import write_table
 from contfric.study.tasks.branch import BRANCH, one_branch
 from contfric.study.tasks.diagram import DIAGRAM
 from contfric.study.tasks.one_parameter import BIFURCATIONS
@@ -47,11 +47,8 @@ def certify_folder(
     kept = [k for k, name in enumerate(header) if name != COLUMN]
     texts = [event.text for event in found.events]
     columns = [[row[k] for k in kept] for row in rows]
-    write_table(
-        folder / BIFURCATIONS,
-        [*(header[k] for k in kept), COLUMN],
-        [[*row, text] for row, text in zip(columns, texts, strict=True)],
-    )
+    rows = [[*row, text] for row, text in zip(columns, texts, strict=True)]
+    write_csv(folder / BIFURCATIONS, [[*(header[k] for k in kept), COLUMN], *rows])
     return found
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from contfric.base.resources import bundled_dir
 from contfric.errors import StudyError, did_you_mean, shown
-from contfric.models.paths import SUFFIXES, is_path, not_a_file
+from contfric.models.paths import SUFFIXES, is_path, no_file, not_a_file
 
 
 def study_names() -> list[str]:
@@ -43,7 +43,12 @@ def study_path(source: str | Path) -> Path:
     if not isinstance(given, (str, Path)) or not str(given).strip() or "\0" in str(given):
         raise StudyError(f"a study is a path or the name of a bundled one, got {shown(given)}")
     if is_path(source):
-        return _file(Path(source))
+        path = Path(source)
+        if fault := no_file(path, "a study"):
+            known = did_you_mean(path.stem, study_names()).partition("Valid")[2]
+            bundled = "" if path.is_dir() else f". Bundled studies{known}"
+            raise StudyError(f"{fault}{bundled}")
+        return path
     text = str(source)
     for suffix in SUFFIXES:
         path = bundled_dir("studies") / f"{text}{suffix}"
@@ -54,14 +59,3 @@ def study_path(source: str | Path) -> Path:
     padded = re.sub(r"(?<!\d)\d$", lambda digit: f"0{digit.group()}", text)
     hint = did_you_mean(padded, names)
     raise StudyError(f"unknown study '{text}'{hint}. {not_a_file(text)}")
-
-
-def _file(path: Path) -> Path:
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise StudyError(f"{path} is a folder; give the YAML file of a study")
-    near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
-    hint = did_you_mean(path.name, sorted(near)) if near else ""
-    bundled = did_you_mean(path.stem, study_names()).partition("Valid")[2]
-    raise StudyError(f"there is no file {path}{hint}. Bundled studies{bundled}")

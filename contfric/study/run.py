@@ -5,26 +5,24 @@ Its folder is never overwritten unasked, and is tried before anything is compute
 
 from __future__ import annotations
 
-import json
-import tempfile
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from contfric.base.files import remove_leftovers, unwritable
+from contfric.base.files import write_csv
 from contfric.base.tally import Counts, counts
 from contfric.errors import ContfricError, ResultFileError, path_of
 from contfric.results import save
 from contfric.study.checkpoint import Checkpoint, check_unfinished, checkpoint_in, goes_on, key_of
 from contfric.study.drawings import draw
-from contfric.study.plan import RECORD, RESULT_FILES, Plan, make_plan
+from contfric.study.folder import Folder, open_folder
+from contfric.study.plan import RECORD, Plan, make_plan
 from contfric.study.read import Study, read_study
 from contfric.study.result import RunStatus, StudyResult, UnwrittenError
-from contfric.study.tables import write_table
 from contfric.study.tasks.task import Found, Job, Task
 
 Progress = Callable[[str], None]
@@ -200,7 +198,7 @@ class _Run:
 
     def _write_table(self, task: Task, name: str, path: Path) -> None:
         header, rows = task.table(name, self.study, self.found[task.result])
-        write_table(path, header, rows)
+        write_csv(path, chain([header], rows))
 
     def _write_data(self, tasks: list[Task]) -> None:
         for task in tasks:
@@ -259,77 +257,3 @@ class _Run:
 
 def _one_line(error: Exception) -> str:
     return str(error) if isinstance(error, ContfricError) else f"{type(error).__name__}: {error}"
-
-
-@dataclass(frozen=True)
-class Folder:
-    """A folder that is ready to take results: whether this run made it, and what was in it."""
-
-    path: Path
-    made: bool
-    earlier: tuple[str, ...] = ()
-
-    def discard_if_empty(self) -> None:
-        """Remove the folder if this run made it and left nothing in it."""
-        if self.made:
-            with suppress(OSError):
-                self.path.rmdir()
-
-    def remove_stale(self, written: Iterable[str]) -> None:
-        """Remove result files of an earlier run that this one has not replaced."""
-        kept = {*written, RECORD}
-        for name in {*RESULT_FILES, *self.earlier} - kept:
-            with suppress(OSError):
-                (self.path / name).unlink()
-
-    def remove_leftovers(self, names: Iterable[str]) -> None:
-        """Remove the halves of files that a killed run has left."""
-        for name in names:
-            remove_leftovers(self.path / name)
-
-    def free_name(self, stem: str) -> Path:
-        """Return a file name that is not taken yet: ``stem.npz``, ``stem-2.npz``, ..."""
-        path, number = self.path / f"{stem}.npz", 2
-        while path.exists():
-            path, number = self.path / f"{stem}-{number}.npz", number + 1
-        return path
-
-
-def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
-    """Return a folder for the results of a run; it is made if it does not exist.
-
-    Parameters
-    ----------
-    files : iterable of str
-        Names of the files that the run writes.
-    force : bool
-        Whether results of an earlier run may be replaced (a run that goes on replaces its own).
-
-    Raises
-    ------
-    ResultFileError
-        If the folder holds results and ``force`` is False, or cannot be written.
-    """
-    holding = [name for name in dict.fromkeys([*RESULT_FILES, *files]) if (path / name).exists()]
-    if holding and not force:
-        raise ResultFileError(
-            f"{path} holds results of an earlier run ({', '.join(holding)}): give another folder "
-            "(--out DIR, out=...), or replace them (--force, force=True)"
-        )
-    made = not path.exists()
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise ResultFileError(unwritable(path, error)) from error
-    return Folder(path, made, _earlier_files(path))
-
-
-def _earlier_files(path: Path) -> tuple[str, ...]:
-    """Return the files that the record of an earlier run names, before this run replaces it."""
-    try:
-        names = json.loads((path / RECORD).read_text(encoding="utf-8"))["files"]
-        return tuple(n for n in names if isinstance(n, str) and Path(n).name == n)
-    except (OSError, ValueError, KeyError, TypeError):
-        return ()

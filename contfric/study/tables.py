@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contfric.base.files import replacing
 from contfric.study.wanted import Want
 
 if TYPE_CHECKING:
@@ -81,11 +78,3 @@ def _columns(study: Study, source: Branch | Orbit) -> dict[str, list[Any]]:
     if study.wants(Want.STABILITY):
         columns["stable"] = np.atleast_1d(np.asarray(source.stable)).tolist()
     return columns
-
-
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table as CSV, whole or not at all."""
-    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)

@@ -23,7 +23,7 @@ from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit, Status
 from contfric.orbit.solve import refine
 from contfric.signature import ReducedItinerary
-from contfric.signature.edits import is_closed_walk
+from contfric.signature.walks import is_closed_walk
 
 #: Each has an orbit, 3 has two; nine others, some without any, take four fifths of the time.
 FAST = (3, 4, 5)

@@ -40,8 +40,9 @@ from contfric.events.local.zero_acceleration import only_comes_back, touch_of
 from contfric.models.definition import Model
 from contfric.models.deriving.growing_model import ComposedModel
 from contfric.orbit.orbit import Orbit
-from contfric.signature.edits import Edit, entered, split, swap_edit
+from contfric.signature.edits import Edit, split, swap_edit
 from contfric.signature.holds import is_hold
+from contfric.signature.walks import entered
 
 if TYPE_CHECKING:
     from contfric.models.structures.shared_loads import Limit

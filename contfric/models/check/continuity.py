@@ -19,7 +19,8 @@ from contfric.base.arrays import FloatArray, with_entries
 from contfric.models.check.probe import ON, Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
-from contfric.models.definition import Domain, Reset
+from contfric.models.definition import Domain
+from contfric.models.parts import Reset
 
 #: States that are tried, those of each mode from which lines are followed, and samples of a line.
 _TRIED, _STATES, _SAMPLES = 100, 2, 160
@@ -95,12 +96,11 @@ def check_jumps_through(report: ModelReport, probe: Probe) -> None:
 
 def _may_jump(probe: Probe) -> list[str]:
     """Return the surfaces whose observables are not made of continuous functions."""
-    if not probe.model.definition:
+    formulas = probe.formulas
+    if formulas is None:
         return [s.name for s in probe.model.surfaces]
-    from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import cannot_jump
 
-    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     return [name for name, h in formulas.heights().items() if not cannot_jump(h, moving)]
 
@@ -211,12 +211,11 @@ def check_reset_jumps(report: ModelReport, probe: Probe) -> None:
 
 def _continuous_resets(probe: Probe) -> set[str]:
     """Return the surfaces whose resets are made of continuous functions: nothing has to be tried there."""
-    if not probe.model.definition:
+    formulas = probe.formulas
+    if formulas is None:
         return set()
-    from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import cannot_jump
 
-    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     return {
         surface.name

@@ -6,7 +6,8 @@ import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, Mode
+from contfric.models.definition import Domain
+from contfric.models.parts import Mode
 
 #: States in a sliding mode that are asked.
 _STATES = 200

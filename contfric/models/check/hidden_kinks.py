@@ -45,12 +45,11 @@ def check_hidden_kinks(report: ModelReport, probe: Probe) -> None:
 
 def _with_hidden_kinks(probe: Probe) -> list[str]:
     """Return the modes whose fields have inverse functions or roots of what moves; none of structures."""
-    if not probe.model.definition or probe.model.composed:
+    formulas = None if probe.model.composed else probe.formulas
+    if formulas is None:
         return []
-    from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import may_have_kinks
 
-    formulas = Formulas(probe.model.description)
     moving = (formulas.t, *formulas.y)
     modes = [mode.name for mode in probe.model.modes for _ in formulas.pieces]
     found = (

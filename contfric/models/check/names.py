@@ -116,14 +116,13 @@ def check_kinks(report: ModelReport, model: Model) -> None:
 def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
     """Warn of kinks of resets between states that meet their surface in one mode: no event tells of them."""
     model = probe.model
-    if not model.definition or not model.resets:
+    formulas = probe.formulas if model.resets else None
+    if formulas is None:
         return
     from sympy import Symbol, lambdify
 
-    from contfric.models.generated.symbols import Formulas
     from contfric.models.language.formulas import kinks_in
 
-    formulas = Formulas(model.description)
     symbols = (formulas.t, *formulas.y, *formulas.p)
     names = dict(zip(symbols, ("t", *model.states, *model.parameter_names), strict=True))
     order = [surface.name for surface in formulas.description.surfaces]

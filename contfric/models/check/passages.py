@@ -7,7 +7,8 @@ from itertools import islice
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, Mode, Model, Reset
+from contfric.models.definition import Domain, Model
+from contfric.models.parts import Mode, Reset
 
 #: States on each surface.
 _ON_SURFACE = 200

@@ -8,7 +8,7 @@ import random
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from contfric.base.arrays import FloatArray
 from contfric.models.definition import Model
 from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.view import FlowView
+
+if TYPE_CHECKING:
+    from contfric.models.generated.symbols import Formulas
 
 #: Newton's method onto a surface: it converges in a few steps or not at all.
 _STEPS = 30
@@ -67,6 +70,13 @@ class Probe:
     def flow(self) -> FlowView:
         """The model's flow at these parameters."""
         return self.model.view(self.vector)
+
+    @cached_property
+    def formulas(self) -> Formulas | None:
+        """The formulas of a model that is declared by its equations (loads sympy)."""
+        from contfric.models.generated.symbols import Formulas
+
+        return Formulas(self.model.description) if self.model.definition else None
 
     @property
     def period(self) -> float:

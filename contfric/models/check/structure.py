@@ -17,7 +17,8 @@ from contfric.models.check.period import (
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
-from contfric.models.definition import Domain, Model, Reset, Surface
+from contfric.models.definition import Domain, Model, Surface
+from contfric.models.parts import Reset
 
 #: States on each surface, and in the whole region.
 _ON_SURFACE, _EVERYWHERE = 200, 400

@@ -15,7 +15,7 @@ import numpy as np
 from contfric.base.arrays import FloatArray
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
-from contfric.models.definition import Constraint, Departure, Domain, Mode, Model, Surface, Symmetry
+from contfric.models.definition import Domain, Model, Surface
 from contfric.models.deriving.departing import (
     departing_side,
     leaves_at_rest,
@@ -33,6 +33,7 @@ from contfric.models.described.regions import domains_of, is_possible, ordered_s
 from contfric.models.entries import EntryError
 from contfric.models.generated.build import GeneratedFlow
 from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Scope, parse
+from contfric.models.parts import Constraint, Departure, Mode, Symmetry
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9

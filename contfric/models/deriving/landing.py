@@ -11,13 +11,13 @@ from collections import Counter
 from collections.abc import Container, Sequence
 from dataclasses import replace
 
-from contfric.models.definition import Domain, Reset, Surface
+from contfric.models.definition import Domain, Surface
 from contfric.models.deriving.sections import joined_modes
 from contfric.models.described.description import wraps_of
 from contfric.models.described.evaluate import Sampler
 from contfric.models.entries import EntryError
 from contfric.models.language.grammar import parse
-from contfric.models.parts import EITHER, Lead, led
+from contfric.models.parts import EITHER, Lead, Reset, led
 
 #: States on a surface that are asked: what a single one says may be an accident.
 _PLACES = 24

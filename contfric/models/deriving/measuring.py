@@ -14,11 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from contfric.errors import ModelError
-from contfric.models.definition import Observable, Surface
+from contfric.models.definition import Surface
 from contfric.models.deriving.sections import joined_modes
 from contfric.models.described.description import Description, ModeText
 from contfric.models.described.evaluate import Sampler, defaults, floats
 from contfric.models.described.regions import engine_order, known_sides
+from contfric.models.parts import Observable
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9

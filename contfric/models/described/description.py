@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
-from contfric.models.definition import Departure, Observable, Parameter, Surface
+from contfric.models.definition import Surface
 from contfric.models.language.names import Names
-from contfric.models.parts import Chatter, Lead
+from contfric.models.parts import Chatter, Departure, Lead, Observable, Parameter
 from contfric.models.structures.contact_laws import KEY as LAWS
 from contfric.models.structures.contact_laws import ContactLaws, written
 from contfric.models.structures.names import STRUCTURE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from contfric.models.definition import Departure, Observable, Parameter, Surface
+from contfric.models.definition import Surface
 from contfric.models.deriving.measuring import measured
 from contfric.models.described.description import Description, DomainText, ModeText
 from contfric.models.described.evaluate import check_period
@@ -14,7 +14,7 @@ from contfric.models.described.ranges import check_ranges, ranges_of, spread_of
 from contfric.models.described.reset_modes import FROM, TO, acts_of, leads_of
 from contfric.models.entries import EntryError, known_keys, known_sides, one_of
 from contfric.models.language.names import Names
-from contfric.models.parts import Chatter
+from contfric.models.parts import Chatter, Departure, Observable, Parameter
 from contfric.models.shorthand.clocks import TICK
 from contfric.models.shorthand.written_out import expanded
 from contfric.models.structures.contact_laws import ContactLaws, check_laws

@@ -7,9 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from contfric.errors import ModelError, NotationError, did_you_mean
+from contfric.errors import ModelError, NotationError
 from contfric.models.definition import Model
 from contfric.models.entries import EntryError, plain
+from contfric.models.paths import no_file
 from contfric.models.structures.matrices import loaded
 from contfric.remember.derived import derived
 
@@ -33,8 +34,10 @@ def read_model(path: Path) -> Model:
     """
     from contfric.base.yaml_lines import read_yaml
 
+    if fault := no_file(path, "a model"):
+        raise ModelError(fault)
     try:
-        located = read_yaml(_file(path))
+        located = read_yaml(path)
         try:
             data = loaded(located.data, path.parent)
             return from_data(data)
@@ -73,17 +76,6 @@ def _written_at(located: LocatedYaml, address: Address) -> Address:
         own, common = address[:3], address[2:]
         return common if own not in located.lines else address
     return address
-
-
-def _file(path: Path) -> Path:
-    if path.is_file():
-        return path
-    if path.is_dir():
-        raise ModelError(f"{path} is a folder; give the YAML file of a model")
-    near = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
-    raise ModelError(
-        f"there is no file {path}{did_you_mean(path.name, sorted(near)) if near else ''}"
-    )
 
 
 @lru_cache(maxsize=64)

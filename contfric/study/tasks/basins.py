@@ -9,17 +9,9 @@ from pydantic import Field
 
 from contfric.base.shown import aligned
 from contfric.base.yaml_schema import whole
+from contfric.study.tasks.grids import axes_text, ends_of, grid_text, values_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import (
-    FigureKind,
-    Job,
-    StudyCheck,
-    axes_text,
-    ends_of,
-    grid_text,
-    incomplete,
-    values_of,
-)
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.response.basins import Basins

@@ -10,18 +10,9 @@ import numpy as np
 from pydantic import Field
 
 from contfric.base.yaml_schema import positive, whole
+from contfric.study.tasks.grids import axes_text, ends_of, grid_text, values_of
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import (
-    STATE,
-    FigureKind,
-    Job,
-    StudyCheck,
-    axes_text,
-    ends_of,
-    grid_text,
-    incomplete,
-    values_of,
-)
+from contfric.study.tasks.task import STATE, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.chaos.map import LyapunovMap

@@ -10,16 +10,8 @@ from pydantic import Field
 from contfric.base.yaml_schema import keys_of, positive, whole
 from contfric.errors import did_you_mean
 from contfric.study.tables import Table
-from contfric.study.tasks.task import (
-    FigureKind,
-    Found,
-    Job,
-    SeedsEntry,
-    StudyCheck,
-    Task,
-    pairs_of,
-    ranges_text,
-)
+from contfric.study.tasks.grids import pairs_of, ranges_text
+from contfric.study.tasks.task import FigureKind, Found, Job, SeedsEntry, StudyCheck, Task
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.yaml_schema import positive, whole
+from contfric.study.tasks.grids import pairs_of, ranges_text
 from contfric.study.tasks.response import Response
-from contfric.study.tasks.task import FigureKind, Job, StudyCheck, pairs_of, ranges_text
+from contfric.study.tasks.task import FigureKind, Job, StudyCheck
 
 if TYPE_CHECKING:
     from contfric.curves.of_quantities.curve import QuantityCurve

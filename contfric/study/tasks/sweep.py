@@ -8,16 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field
 
+from contfric.study.tasks.grids import ends_of, values_of
 from contfric.study.tasks.response import SectionTask
-from contfric.study.tasks.task import (
-    PARAMETER,
-    FigureKind,
-    Job,
-    StudyCheck,
-    ends_of,
-    incomplete,
-    values_of,
-)
+from contfric.study.tasks.task import PARAMETER, FigureKind, Job, StudyCheck, incomplete
 
 if TYPE_CHECKING:
     from contfric.response.sweep import Sweep
