@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from contfric.bvp.system import inside_sign
+from contfric.errors import number_and
 from contfric.models.definition import Model
 from contfric.signature import ReducedItinerary
 from contfric.signature.edits import show
@@ -49,7 +50,9 @@ class ClosedItinerary:
     orbits: int = 0
 
     def __str__(self) -> str:
-        return f"{show(self.itinerary)} over {self.periods} period(s): {self.fate.value}"
+        return (
+            f"{show(self.itinerary)} over {number_and(self.periods, 'period')}: {self.fate.value}"
+        )
 
 
 def returns(model: Model, itinerary: ReducedItinerary) -> bool:
