@@ -343,6 +343,17 @@ def path_of(what: str, value: object) -> Path:
     return Path(value)
 
 
+def number_and(count: int, noun: str, nouns: str = "") -> str:
+    """Return a number with its noun, in the singular or the plural.
+
+    Examples
+    --------
+    >>> number_and(1, "branch", "branches"), number_and(0, "period")
+    ('1 branch', '0 periods')
+    """
+    return f"{count} {noun if count == 1 else nouns or f'{noun}s'}"
+
+
 def either(one: str, other: str) -> str:
     """Return what a kind of event is in words, where places of one diagram differ in it.
 

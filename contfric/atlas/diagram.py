@@ -12,6 +12,7 @@ from contfric.base.extras import need_flint
 from contfric.base.shown import Shown
 from contfric.base.tabled import stacked
 from contfric.continuation.branch import Branch
+from contfric.errors import number_and
 from contfric.events.bifurcation import Bifurcation, End, Kind, Proposal
 from contfric.models.definition import Model
 from contfric.quantities.registry import QuantityLike
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from contfric.plot.diagrams.look import LineStyle
     from contfric.plot.live.frame import Frame
     from contfric.plot.live.serve import Live
-    from contfric.quantities.registry import QuantityLike
     from contfric.response.sweep import Sweep
 
 
@@ -394,6 +394,6 @@ class Diagram(Shown):
     def __repr__(self) -> str:
         low, high = self.range
         return (
-            f"<Diagram of {self.model.name}: {len(self.branches)} branches, "
-            f"{len(self.bifurcations)} bifurcations, {self.parameter} in [{low:g}, {high:g}]>"
+            f"<Diagram of {self.model.name}: {number_and(len(self.branches), 'branch', 'branches')}, "
+            f"{number_and(len(self.bifurcations), 'bifurcation')}, {self.parameter} in [{low:g}, {high:g}]>"
         )

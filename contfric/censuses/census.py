@@ -23,7 +23,7 @@ from contfric.censuses.orbits import Catalogue
 from contfric.censuses.result import Census, SectionSearch
 from contfric.censuses.search import Progress, Search, searched
 from contfric.censuses.sections import Section, exit_arcs, sections_of
-from contfric.errors import ParameterError, whole_number
+from contfric.errors import ParameterError, number_and, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.tied import tied
@@ -226,13 +226,15 @@ def limits_of(
     interrupted: bool,
 ) -> tuple[str, ...]:
     """Return one line for each thing that bounds a census."""
-    lines = [f"asked for: up to {limits.periods} period(s) and {limits.stops} stop(s)"]
+    lines = [
+        f"asked for: up to {number_and(limits.periods, 'period')} and {number_and(limits.stops, 'stop')}"
+    ]
     for search in searches:
         lines += [f"{search.section}: {text}" for text in _of_section(search, limits)]
     for itinerary, periods in sorted(catalogue.continua):
         lines.append(
-            f"{show(itinerary)} over {periods} period(s): a multiplier is 1; of what may be a continuum of "
-            "orbits one is listed"
+            f"{show(itinerary)} over {number_and(periods, 'period')}: a multiplier is 1; of what may be "
+            "a continuum of orbits one is listed"
         )
     if interrupted:
         lines.append("interrupted: what is listed was found until then")
@@ -244,10 +246,12 @@ def _of_section(search: SectionSearch, limits: CensusLimits) -> list[str]:
     if search.cut:
         lines.append(
             f"{search.cut} of {search.starts} starts make more than {limits.stops} stops in "
-            f"{limits.periods} period(s): orbits with more stops may exist"
+            f"{number_and(limits.periods, 'period')}: orbits with more stops may exist"
         )
     else:
-        lines.append(f"no start makes more than {limits.stops} stops in {limits.periods} period(s)")
+        lines.append(
+            f"no start makes more than {limits.stops} stops in {number_and(limits.periods, 'period')}"
+        )
     if search.held:
         lines.append(f"{search.held} of {search.starts} starts come to rest for ever")
     if search.farthest > NEAR_ENOUGH * search.reach:

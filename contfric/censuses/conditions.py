@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from contfric.errors import number_and
 from contfric.models.definition import Model
 from contfric.models.mode_domains import inside_sign
 from contfric.signature import ReducedItinerary
@@ -49,7 +50,9 @@ class ClosedItinerary:
     orbits: int = 0
 
     def __str__(self) -> str:
-        return f"{show(self.itinerary)} over {self.periods} period(s): {self.fate.value}"
+        return (
+            f"{show(self.itinerary)} over {number_and(self.periods, 'period')}: {self.fate.value}"
+        )
 
 
 def returns(model: Model, itinerary: ReducedItinerary) -> bool:

@@ -13,6 +13,7 @@ from contfric.base.renamed import renamed
 from contfric.base.shown import Shown, aligned
 from contfric.base.tabled import as_table
 from contfric.censuses.conditions import ClosedItinerary, Fate
+from contfric.errors import number_and
 from contfric.models.definition import Model
 from contfric.orbit.orbit import DEGENERATE, Orbit
 
@@ -195,8 +196,8 @@ class Census(Shown):
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         ended = "" if self.complete else "; incomplete"
         return (
-            f"<Census of {self.model.name}: {len(self.orbits)} orbits ({len(self.stable)} stable) of "
-            f"up to {self.periods} period(s) and {self.stops} stops; {values}{ended}>"
+            f"<Census of {self.model.name}: {len(self.orbits)} orbits ({len(self.stable)} stable) of up "
+            f"to {number_and(self.periods, 'period')} and {number_and(self.stops, 'stop')}; {values}{ended}>"
         )
 
 

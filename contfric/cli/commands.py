@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from contfric.cli.exits import Exit
-from contfric.errors import ParameterError, ResultFileError
+from contfric.errors import ParameterError, ResultFileError, number_and
 
 if TYPE_CHECKING:
     from contfric.models import Model, ModelSource
@@ -63,9 +63,11 @@ def _interrupted_text(result: StudyResult) -> str:
     on = "; the same command goes on from there" if result.goes_on else ""
     if not result.files:
         return f"interrupted before an orbit was found: there is nothing to save{on}"
-    found = f"{len(result.diagram.branches)} branches" if result.diagram else "the first orbit"
-    if result.orbit is None:
-        found = "the finished part of the map"
+    found = "the first orbit"
+    if result.diagram:
+        found = number_and(len(result.diagram.branches), "branch", "branches")
+    elif result.orbit is None:
+        found = "the finished part"
     return f"interrupted: what was found until then ({found}) is saved in {result.out}{on}"
 
 
@@ -196,7 +198,7 @@ def _say_what_settles(
     with ProgressLine() as progress:
         orbit = find_orbit(model, params, state=state, time=time, progress=progress)
     multipliers = ", ".join(f"{value:.6g}" for value in orbit.multipliers)
-    say(f"converges to {orbit.name} over {orbit.periods} period(s): {orbit.signature}")
+    say(f"converges to {orbit.name} over {number_and(orbit.periods, 'period')}: {orbit.signature}")
     say(f"x from {orbit.x_min:.12g} to {orbit.x_max:.12g}, multipliers {multipliers}")
 
 

@@ -58,7 +58,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         unknown
     ):  # argparse would point to the help of the program, which has no options of a command
         of = f"contfric {first}" if first is not None else "contfric"
-        raise UsageError(f"unrecognized arguments: {' '.join(unknown)} (see: {of} --help)")
+        values = [text for text in unknown if "=" in text and not text.startswith("-")]
+        advice = f"a parameter is -p {values[0]}; " if values and hasattr(options, "params") else ""
+        raise UsageError(f"unrecognized arguments: {' '.join(unknown)} ({advice}see: {of} --help)")
     return options
 
 

@@ -16,7 +16,7 @@ from contfric.base.named import Named
 from contfric.base.shown import Shown
 from contfric.ensembles.rows import Drawn, Rows, by_sample
 from contfric.ensembles.statistics import SobolIndices, share_of, sobol_indices
-from contfric.errors import ParameterError, did_you_mean, shown
+from contfric.errors import ParameterError, did_you_mean, number_and, shown
 from contfric.models.definition import Model
 from contfric.quantities.registry import QuantityLike
 
@@ -332,5 +332,5 @@ class Ensemble(Shown):
         varied = ", ".join(self.distributions)
         return (
             f"<Ensemble of {self.model.name}: {len(self)} diagrams in {self.parameter}, random {varied}; "
-            f"{found}; {len(self.classes)} classes>"
+            f"{found}; {number_and(len(self.classes), 'class', 'classes')}>"
         )

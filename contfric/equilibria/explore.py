@@ -18,7 +18,7 @@ from contfric.equilibria.newton import Zeros
 from contfric.equilibria.regions import scale_of
 from contfric.equilibria.result import Equilibrium, EquilibriumSet
 from contfric.equilibria.trace import continue_equilibrium
-from contfric.errors import checked_range, function_of, whole_number
+from contfric.errors import checked_range, function_of, number_and, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.tied import tied
@@ -99,8 +99,8 @@ class EquilibriumDiagram(Shown):
         events = ", ".join(e.label for e in self.events) or "no events"
         low, high = self.bounds
         return (
-            f"<EquilibriumDiagram of {self.model.name}: {len(self)} branches, {self.parameter} in "
-            f"[{low:g}, {high:g}]; {events}>"
+            f"<EquilibriumDiagram of {self.model.name}: {number_and(len(self), 'branch', 'branches')}, "
+            f"{self.parameter} in [{low:g}, {high:g}]; {events}>"
         )
 
 
@@ -149,7 +149,7 @@ def explore_equilibria(
     --------
     >>> import contfric as cf
     >>> cf.explore_equilibria("popp", "a2", (0.3, 0.8), {"F": 0.0})
-    <EquilibriumDiagram of popp: 1 branches, a2 in [0.3, 0.8]; H->
+    <EquilibriumDiagram of popp: 1 branch, a2 in [0.3, 0.8]; H->
     """
     model, params = tied(model, params)
     active = model.index_of(parameter)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +32,8 @@ _ORBIT: dict[str, Any] = {
     "markeredgecolor": "black",
     "markersize": 5,
 }
+#: Id of the legend of basins, which a stable set over them adds its lines to.
+_LEGEND = "basins"
 #: What a legend says of starts without a solution.
 _NONE = {"no_solution": "no solution starts there"}
 
@@ -67,9 +70,15 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
         handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
     if found.missing:
         handles.append(Line2D([], [], ls="", label=f"{found.missing} starts not computed"))
-    ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
+    _explain(ax, handles)
     name_axes(ax, parameter_label(first), parameter_label(second))
     return ax
+
+
+def _explain(ax: Axes, handles: Sequence[Artist]) -> None:
+    """Write the legend next to the axes; basins and stable sets over each other have one."""
+    legend = ax.legend(handles=handles, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
+    legend.set_gid(_LEGEND)
 
 
 def _shown(found: Basins) -> list[str]:
@@ -102,17 +111,21 @@ def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:
         Where to draw, such as the axes of basins; new axes by default.
     """
     ax = axes_or_new(ax)
-    alone = not ax.has_data()
+    before, alone = ax.get_legend(), not ax.has_data()
     first, second = found.orbit.model.states
+    name = f"stable set of {found.orbit.name}"
     for half, breaks in zip(found.states, found.breaks, strict=True):
         for part in np.split(half, breaks):
-            (line,) = ax.plot(
-                *part.T, color="black", lw=1.0, gid=f"stable set of {found.orbit.name}"
-            )
+            (line,) = ax.plot(*part.T, color="black", lw=1.0, gid=name)
     (mark,) = ax.plot(*found.states[0][0], "s", color="white", mec="black", ms=5)
+    line.set_label("stable set")
+    mark.set_label(f"{found.orbit.name}, unstable")
     if alone:
-        texts = "stable set", f"{found.orbit.name}, unstable"
-        ax.legend([line, mark], texts, fontsize=sized(SMALL), frameon=False, **NEXT_TO)
+        _explain(ax, [line, mark])
+    elif before is not None and before.get_gid() == _LEGEND:
+        others = [h for h in before.legend_handles if h is not None]
+        known = {h.get_label() for h in others}
+        _explain(ax, [*others, *(h for h in (line, mark) if h.get_label() not in known)])
     if not ax.get_xlabel():
         name_axes(ax, parameter_label(first), parameter_label(second))
     return ax

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 #: Share of the samples that have an orbit there, above which a band is drawn: quantiles of fewer say little.
 _FEW = 0.02
-#: Events in at least so many of the diagrams are drawn: a tenth.
-_FREQUENT = 0.1
+#: Events in at least so many of the diagrams are drawn, a tenth, and of these the most frequent.
+_FREQUENT, _MOST = 0.1, 12
 #: Height of an event's line, as a share of the axes: below the bands, one above the other.
 _LINE = 0.022
 #: Opacity of the area of stable and of unstable orbits.
@@ -86,11 +86,13 @@ def _row_label(found: Ensemble) -> str:
 
 def _draw_events(ax: Axes, found: Ensemble) -> None:
     """Draw median and 90 % of each frequent event, each on a line of its own at the foot of the axes."""
-    frequent = [e for e in found.events if e.share >= _FREQUENT and not e.label.startswith("T ")]
+    told = [e for e in found.events if e.share >= _FREQUENT and not e.label.startswith("T ")]
+    frequent = told[:_MOST]
     if not frequent:
         return
     bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom - (top - bottom) * _LINE * (2 + len(frequent)), top)
+    strip = _LINE * (2 + len(frequent))  # of the axes as they are then
+    ax.set_ylim(bottom - (top - bottom) * strip / (1.0 - strip), top)
     where = ax.get_xaxis_transform()
     for k, event in enumerate(frequent, start=1):
         low, middle, high = event.quantiles()

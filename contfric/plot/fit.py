@@ -46,7 +46,8 @@ def plot_fit(found: Fit, ax: Axes | None = None) -> Axes:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_xlim(0.5, table["datum"].max() + 0.5)
     names = {"t": "$t$", "datum": "datum"}
-    name_axes(ax, names.get(across) or parameter_label(across), "measured, and fitted (lines)")
+    look = "line" if across == "t" else "crosses"
+    name_axes(ax, names.get(across) or parameter_label(across), f"measured, and fitted ({look})")
     ax.legend(fontsize=sized(SMALL), loc="best")
     return ax
 

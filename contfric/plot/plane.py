@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from contfric.base.arrays import FloatArray
-from contfric.errors import either
+from contfric.errors import ParameterError, either
 from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
-from contfric.plot.appearance.names import event_label, parameter_label
+from contfric.plot.appearance.names import event_label, parameter_label, title_label
 from contfric.plot.appearance.save import axes_or_new, name_axes
 from contfric.plot.appearance.style import (
     BLACK,
@@ -29,6 +29,7 @@ from contfric.plot.appearance.style import (
     STABLE,
     UNSTABLE,
     VERMILLION,
+    row_of,
     sized,
 )
 
@@ -74,7 +75,8 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
         Where to draw; new axes by default.
     """
     ax = axes_or_new(ax)
-    labels = {True: curve.label, False: f"{curve.label} (unstable orbits)"}
+    label = _curve_label(curve)
+    labels = {True: label, False: f"{label} (unstable orbits)"}
     for stable, group in itertools.groupby(range(len(curve)), key=lambda k: bool(curve.stable[k])):
         run = list(group)
         part = curve.values[run[0] : run[-1] + 2]  # to the first point of the next run
@@ -89,6 +91,18 @@ def plot_quantity_curve(curve: QuantityCurve, ax: Axes | None = None) -> Axes:
     name_axes(ax, parameter_label(curve.parameters[0]), parameter_label(curve.parameters[1]))
     ax.legend(fontsize=sized(SMALL), loc="best")
     return ax
+
+
+def _curve_label(curve: QuantityCurve) -> str:
+    """Return the label of a curve of orbits, its quantity as on the axis of a diagram."""
+    held, model = curve.quantity, curve.model
+    if not curve.label.startswith(held):
+        return curve.label
+    try:
+        name = row_of(held, model).name(model.states[0])
+    except ParameterError:  # a user's function, which its file does not keep
+        name = held
+    return name + title_label(curve.label[len(held) :], curve.parameters)
 
 
 def plot_curves(curves: Sequence[Curve], ax: Axes | None = None, *, special: bool = True) -> Axes:

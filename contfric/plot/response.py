@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.plot.appearance.names import fixed_text, parameter_label
+from contfric.plot.appearance.names import fixed_text, parameter_label, told
 from contfric.plot.appearance.save import axes_or_new, name_axes
 from contfric.plot.appearance.style import GREY, SMALL, TEXT, lighter, sized
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Colours of the directions: both read in grey.
 _COLOURS = {"up": "#1F4E79", "down": "#C04F15"}
+#: Colour of points in the background of branches.
+_BACKGROUND = lighter(GREY, 0.2)
 #: Size of a point: a thousand values give a thousand columns, which a page does not resolve finer.
 _POINT = 1.2
 
@@ -50,7 +53,7 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
         parameter_label(sweep.parameter),
         f"{parameter_label(name)} at {_section(sweep.section)}",
     )
-    ax.set_title(fixed_text(sweep.params), fontsize=sized(TEXT))
+    ax.set_title(fixed_text(told(sweep.params, sweep.model.defaults)), fontsize=sized(TEXT))
     if len(sweep.runs) > 1:
         ax.legend(fontsize=sized(SMALL), markerscale=4.0, loc="best")
     return ax
@@ -78,7 +81,14 @@ def draw_overlay(
     found = [list(overlay.quantity(cast("str", row))) for row in rows]
     for ax, points in zip(axes, found, strict=True):
         for _, x, y in points:
-            _draw(ax, x, y, lighter(GREY, 0.2), 0.5, None)
+            _draw(ax, x, y, _BACKGROUND, 0.5, None)
+
+
+def overlay_handle() -> Line2D:
+    """Return what a legend shows of the points of a sweep in the background."""
+    size = 4.0 * sized(_POINT)
+    label = "simulated (sweep)"
+    return Line2D([], [], ls="none", marker=".", markersize=size, color=_BACKGROUND, label=label)
 
 
 def _draw(

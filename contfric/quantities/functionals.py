@@ -23,7 +23,7 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.base.attributes import cached_property
-from contfric.errors import ParameterError
+from contfric.errors import ParameterError, number_and
 from contfric.models.language.quantity_texts import WORK, Functional
 from contfric.quantities.duals import Dual, Kinks, Number, apply, constant
 from contfric.quantities.extreme import is_compiled, moved_peak, peak_in
@@ -205,8 +205,9 @@ class Measuring:
         cycles = asked.harmonic * (1 if orbit.model.autonomous else orbit.periods)
         if abs(cycles - round(cycles)) > 1e-9:
             raise ParameterError(
-                f"{asked.kind}({asked.text}, {asked.harmonic:g}): an orbit of {orbit.periods} "
-                f"period(s) has the harmonics 1/{orbit.periods}, 2/{orbit.periods}, ... of the excitation"
+                f"{asked.kind}({asked.text}, {asked.harmonic:g}): an orbit of "
+                f"{number_and(orbit.periods, 'period')} has the harmonics 1/{orbit.periods}, "
+                f"2/{orbit.periods}, ... of the excitation"
             )
         return round(cycles)
 

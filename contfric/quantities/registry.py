@@ -322,6 +322,11 @@ def _unknown(name: str, model: Model, inside: Inside) -> None:
             f"'{name}' varies along an orbit: write one of "
             f"{', '.join(f'{kind}({name})' for kind in FUNCTIONALS[:5])}"
         )
+    state, _, which = name.rpartition("_")
+    if state in inside.known and which in ("max", "min"):  # as an axis calls the displacement's
+        raise ParameterError(
+            f"model '{model.name}' has no quantity '{name}': write {which}({state})"
+        )
     known = [*NAMED, *(n for n, _ in model.quantities), *model.parameter_names]
     state = model.states[0]
     raise ParameterError(

@@ -26,8 +26,12 @@ from contfric.response.cuts import Following
 from contfric.response.returns import ReleaseMap
 from contfric.response.sections import RELEASES, section_of
 from contfric.response.sweeping import compiled, positive
-from contfric.response.ways_out_of_rest import release_of
+from contfric.response.ways_out_of_rest import WayOutOfRest, release_of
 
+#: A change between two releases that is so many times the largest one next to it may be a jump (at the end of
+#: a branch with a vertical tangent it is 2.4 times); it is one if this share of it stays when the gap has
+#: been halved so often (of a vertical tangent of third order 1 % stays).
+_STEEP, _STAYS, _HALVINGS = 3.0, 0.5, 20
 #: Bytes of a release: its parameters, its events, its results.
 _BYTES = 512
 
@@ -113,33 +117,63 @@ def release_map(
             [whole.part(part) for part in parts], lambda k, got: put_rows(rows, parts[k], got)
         )
     found, period = rows.found, view.period
-    returns, images = np.full(len(times), np.nan), np.full(len(times), np.nan)
-    returns[found] = (rows.times + rows.cycles * period - times)[found]
+    returns, images = rows.after(times, period), np.full(len(times), np.nan)
     shifts = way.shifts(view, rows.times[found], rows.states[found])
     images[found] = np.mod(rows.times[found] + shifts, period)
-    branch = _branches(rows.itineraries, times, images, 1.5 * period / count, period)
+    near = _neighbours(rows, times, 1.5 * period / count)
+    near &= np.abs(np.diff(images, prepend=np.nan)) <= 0.5 * period
+    near &= ~_jumps(whole, way, rows, returns, near)
+    branch = np.where(found, np.cumsum(found & ~near) - 1, -1)
     return ReleaseMap(model, vector, *way.names, period, times, images, returns, branch, states)
 
 
-def _branches(
-    itineraries: IntArray, phases: FloatArray, images: FloatArray, step: float, period: float
-) -> IntArray:
-    """Return the number of the branch of each release: it ends where the itinerary, or the grid, does."""
-    branch = np.full(len(itineraries), -1, dtype=np.int64)
-    number = -1
-    for k in range(len(itineraries)):
-        if not np.isfinite(images[k]):
-            continue
-        joined = (
-            k > 0
-            and branch[k - 1] >= 0
-            and itineraries[k] == itineraries[k - 1]
-            and phases[k] - phases[k - 1] <= step
-            and abs(images[k] - images[k - 1]) <= 0.5 * period
-        )
-        number += 0 if joined else 1
-        branch[k] = number
-    return branch
+def _neighbours(rows: ReleaseRows, times: FloatArray, step: float) -> NDArray[np.bool_]:
+    """Return for each release whether it has the segments of the one a step before it."""
+    near = np.zeros(len(times), dtype=bool)
+    near[1:] = rows.found[1:] & rows.found[:-1] & (np.diff(times) <= step)
+    near[1:] &= rows.itineraries[1:] == rows.itineraries[:-1]
+    return near
+
+
+def _jumps(
+    task: ReleaseTile,
+    way: WayOutOfRest,
+    rows: ReleaseRows,
+    returns: FloatArray,
+    near: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Return for each release whether the map jumps between the one before it and itself.
+
+    The segments may be the same on both sides: where rest just reaches its limit (AS), it ends there or
+    later. The gap between two releases is halved, to the half over which the map changes more: over a jump
+    the change stays, and where the map is continuous it vanishes.
+    """
+    jumps, view = np.zeros(len(near), dtype=bool), task.model.view(task.vector)
+    change = np.where(near, np.abs(np.diff(returns, prepend=np.nan)), 0.0)
+    usual = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
+    tried = np.flatnonzero(near & (change > _STEEP * usual))
+    ends = np.stack([task.times[tried - 1], task.times[tried]])
+    values = np.stack([returns[tried - 1], returns[tried]])
+    for _ in range(_HALVINGS):
+        if not len(tried):
+            break
+        middle = ends.mean(axis=0)
+        states = [way.state_at(view, t) for t in middle.tolist()]
+        there = np.array([y is not None for y in states])
+        at = [
+            start if y is None else y for y, start in zip(states, task.states[tried], strict=True)
+        ]
+        half = compute_release_tile(replace(task, times=middle, states=np.array(at)))
+        between = half.after(middle, view.period)
+        same = there & half.found & (half.itineraries == rows.itineraries[tried])
+        left = np.abs(between - values[0]) >= np.abs(values[1] - between)
+        ends = np.where(left, [ends[0], middle], [middle, ends[1]])
+        values = np.where(left, [values[0], between], [between, values[1]])
+        jumps[tried[~same]] = True  # something else lies between
+        kept = same & (np.abs(np.diff(values, axis=0)[0]) > _STAYS * change[tried])
+        tried, ends, values = tried[kept], ends[:, kept], values[:, kept]
+    jumps[tried] = True
+    return jumps
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +193,10 @@ class ReleaseRows:
     times: FloatArray
     states: FloatArray
     itineraries: IntArray
+
+    def after(self, times: FloatArray, period: float) -> FloatArray:
+        """Return the times until the next release, nan if there is none; the releases are at ``times``."""
+        return np.where(self.found, self.times + self.cycles * period - times, np.nan)
 
     @staticmethod
     def empty(count: int, n: int) -> ReleaseRows:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_flint
 from contfric.base.tabled import Columns, Tabled
-from contfric.errors import ParameterError, shown, whole_number
+from contfric.errors import ParameterError, number_and, shown, whole_number
 from contfric.models.definition import Model
 from contfric.response.outcome import Outcome
 
@@ -240,7 +240,7 @@ class ReleaseMap(Tabled):
         values = ", ".join(f"{k}={v:.6g}" for k, v in self.params.items())
         return (
             f"<ReleaseMap of {self.model.name}: {len(self)} releases at {self.surface}, "
-            f"{len(self.branches)} branches, {values}>"
+            f"{number_and(len(self.branches), 'branch', 'branches')}, {values}>"
         )
 
 

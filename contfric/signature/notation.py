@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from contfric.base.shown import Shown
-from contfric.errors import NotationError, shown
+from contfric.errors import NotationError, number_and, shown
 from contfric.models import Model, load_model, model_names
 from contfric.signature.cyclic import least_rotation, rotated
 from contfric.signature.graph import crossing, successors, unknown_domain
@@ -94,7 +94,7 @@ class Signature(Shown):
             raise NotationError(f"periods must be a whole number >= 1, got {self.periods!r}")
         if self.symmetric and not self.is_mirror_symmetric:
             raise NotationError(
-                f"an orbit of '{self}' over {self.periods} period(s) cannot be symmetric: the "
+                f"an orbit of '{self}' over {number_and(self.periods, 'period')} cannot be symmetric: the "
                 "second half of the segments is not the mirror image of the first"
             )
 

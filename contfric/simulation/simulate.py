@@ -160,7 +160,7 @@ class Trajectory(Shown):
         """Return the columns of :meth:`to_dataframe` without pandas."""
         return table(self, points)
 
-    def plot(self, ax: Axes | None = None, points: int = 1000) -> Axes:
+    def plot(self, ax: Axes | None = None, points: int | None = None) -> Axes:
         """Draw the trajectory in the plane of the first two states, coloured by mode."""
         from contfric.plot.orbits.trajectory import plot_trajectory
 

@@ -13,6 +13,9 @@ from contfric.base.files import remove_leftovers, unwritable
 from contfric.errors import ResultFileError
 from contfric.study.plan import RECORD, RESULT_FILES
 
+#: Files that a message names.
+_SHOWN = 4
+
 
 @dataclass(frozen=True)
 class Folder:
@@ -66,8 +69,8 @@ def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
     holding = [name for name in dict.fromkeys([*RESULT_FILES, *files]) if (path / name).exists()]
     if holding and not force:
         raise ResultFileError(
-            f"{path} holds results of an earlier run ({', '.join(holding)}): give another folder "
-            "(--out DIR, out=...), or replace them (--force, force=True)"
+            f"{path} holds results of an earlier run ({_first(holding)}): give another folder (--out DIR, "
+            "out=...), or replace them (--force, force=True)"
         )
     made = not path.exists()
     try:
@@ -77,6 +80,12 @@ def open_folder(path: Path, files: Iterable[str], force: bool) -> Folder:
     except OSError as error:
         raise ResultFileError(unwritable(path, error)) from error
     return Folder(path, made, _earlier_files(path))
+
+
+def _first(names: list[str]) -> str:
+    """Return some names for a message."""
+    left = len(names) - _SHOWN
+    return ", ".join(names[:_SHOWN]) + (f" and {left} others" if left > 0 else "")
 
 
 def _earlier_files(path: Path) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ def test_it_is_a_sequence_of_orbits(census: cf.Census) -> None:
     assert census[0].name == "0s"
     assert [orbit.name for orbit in census.stable] == ["0s", "1a"]
     assert census.with_mirrors == 5
-    expected = "<Census of coulomb: 3 orbits (2 stable) of up to 2 period(s) and 6 stops;"
+    expected = "<Census of coulomb: 3 orbits (2 stable) of up to 2 periods and 6 stops;"
     assert repr(census).startswith(expected)
 
 
@@ -57,7 +57,7 @@ def test_dataframe(census: cf.Census) -> None:
 
 def test_limits_are_said(census: cf.Census) -> None:
     text = "\n".join(census.limits)
-    assert "up to 2 period(s) and 6 stop(s)" in text
+    assert "up to 2 periods and 6 stops" in text
     assert "positions within" in text
     assert "no start makes more than 6 stops" in text
     few = cf.census("coulomb", PARAMS, stops=1)

@@ -442,7 +442,7 @@ def test_simulate_prints_csv(capsys) -> None:
 
 def test_simulate_finds_what_the_motion_settles_on(capsys) -> None:
     assert main(["simulate", "--periods", "1", "--find"]) == Exit.DONE
-    assert "converges to 1a over 1 period(s): " in capsys.readouterr().err
+    assert "converges to 1a over 1 period: " in capsys.readouterr().err
     code = main(["simulate", "-p", "Omega=0.35", "-p", "S=0.1", "--periods", "1", "--find"])
     assert code == Exit.FAILED
     printed = capsys.readouterr()

@@ -58,6 +58,7 @@ from contfric.plot.appearance.style import (
     domain_colours,
     lighter,
 )
+from contfric.plot.diagrams.branch_graph import _middles
 from contfric.plot.diagrams.events import marks_of
 from contfric.plot.diagrams.runs import aligned, stability_runs, threaded
 from contfric.plot.orbits.orbit import _columns
@@ -510,6 +511,19 @@ def test_branch_graph_has_every_branch_and_every_joint_once(diagram: Any) -> Non
     assert len(shown) == len(originals) + 4  # and CS_s; folds and tangencies join nothing
     edges = [line for line in ax.lines if line.get_marker() == "None"]
     assert len(edges) == 3 + 3, "CS_s has an arm to each of three branches"
+    marks = [line.get_xydata()[0] for line in ax.lines if line.get_marker() != "None"]
+    assert min(np.hypot(*(a - b)) for a, b in combinations(marks, 2)) > 0.2
+
+
+def test_a_mark_lies_on_its_own_edge_only() -> None:
+    """Two edges that cross in their middles have two marks, neither of them where they cross."""
+    places = [(0.0, 0.0), (2.0, 2.0), (0.0, 2.0), (2.0, 0.0)]
+    joints: Any = [SimpleNamespace(nodes=(0, 1)), SimpleNamespace(nodes=(2, 3))]
+    middles = np.array(_middles(joints, places))
+    assert np.all(np.hypot(*(middles - 1.0).T) > 0.25)
+    assert middles[0, 0] == pytest.approx(middles[0, 1])
+    assert middles[1].sum() == pytest.approx(2.0)
+    assert _middles(joints[:1], places) == [(1.0, 1.0)]
 
 
 def test_branch_graph_of_separate_parts(diagram: Any) -> None:
@@ -794,6 +808,34 @@ def test_lines_are_sampled_inside_of_the_axes_only(seed: int) -> None:
     )
     gaps = [np.abs(found - point).max(axis=1).min() for point in inside[::50]]
     assert max(gaps) < 0.02  # a spacing is 0.008 of the width
+
+
+def test_a_branch_that_grows_without_bound_leaves_the_axes() -> None:
+    orbit = cf.find_orbit("coulomb", {"Omega": 0.9, "S": 0.1, "S0": 0.1})
+    branch = cf.continue_orbit(orbit, "Omega", (0.7, 1.3))  # x_max grows to 1e6 at resonance
+    assert branch.x_max.max() > 1e5
+    for row in ("x_max", "stops"):
+        low, high = branch.plot(row=row).get_ylim()
+        far = branch.x_max[np.abs(branch.values - 1.0) > 0.05 * np.ptp(branch.values)]
+        assert far.max() < high < 3.0 * far.max() and low < far.min()
+
+
+def test_multipliers_jump_where_a_branch_ends(diagram: Any) -> None:
+    """At a CS the multipliers are those of the orbit on each side: no line leads from one to the other."""
+    (event,) = diagram.of_kind("CS")
+    ends = [
+        (branch.quantity("multiplier")[-side], stability_runs(branch, "multiplier")[-side])
+        for branch in diagram.branches
+        for side, end in enumerate(branch.ends)
+        if end.bifurcation is not None and end.bifurcation.kind is event.kind
+    ]
+    assert len(ends) == 4 and np.ptp([value for value, _ in ends]) > 0.1
+    for value, run in ends:
+        assert np.min(np.abs(run.y[[0, -1]] - value)) == 0.0
+        assert np.max(np.abs(np.diff(run.y[:, 0]))) < 0.2  # the jump is 0.7 or more
+    (mark,) = marks_of([event], diagram.branches, "multiplier", "Omega")
+    for value, _ in ends:
+        assert np.min(np.abs(mark.y - value)) < 1e-9
 
 
 def test_multipliers_that_grow_without_bound_leave_the_axes() -> None:

@@ -81,6 +81,30 @@ def test_fixed_points_are_orbits() -> None:
         assert np.min(np.abs(found.fixed_points() - release)) < 1e-4
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_no_branch_of_a_release_map_has_a_jump(seed: int) -> None:
+    """Where the map is continuous, its changes get smaller with the step; over a jump they stay."""
+    rng = np.random.default_rng(seed)
+    params = {"Omega": rng.uniform(0.2, 0.6), "S": rng.uniform(0.02, 0.3)}
+    params["S0"] = params["S"] + rng.uniform(0.05, 0.3)
+    largest = []
+    for count in (300, 300 * 27):
+        found = cf.release_map("coulomb", params, count=count)
+        change = np.abs(np.diff(found.returns))[found.branch[1:] == found.branch[:-1]]
+        largest.append(np.nanmax(change))
+    # a vertical tangent of third order: a third of the change stays
+    assert largest[1] < 0.4 * largest[0]
+
+
+def test_a_jump_between_two_releases_with_the_same_segments_parts_branches() -> None:
+    """Near a phase of 1.229 rest just reaches its limit: it ends there, or 1.4 later."""
+    found = cf.release_map("coulomb", CHAOS, count=400)
+    k = int(np.searchsorted(found.phases, 1.229))
+    assert found.branch[k] == found.branch[k - 1] + 1
+    assert found.images[k] - found.images[k - 1] == pytest.approx(1.39, abs=0.05)
+    assert np.min(np.abs(found.fixed_points() - 1.229)) > 0.1
+
+
 def test_branches_and_cobweb(tmp_path: Path) -> None:
     found = cf.release_map("coulomb", CHAOS, count=400)
     assert sum(len(x) for x, _ in found.branches) == np.isfinite(found.images).sum()

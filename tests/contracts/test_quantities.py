@@ -48,7 +48,7 @@ def test_the_list_of_names_is_one() -> None:
         ("rms(mean(x))", "a functional cannot stand inside of another one"),
         ("amplitude(x)", "amplitude() is such as amplitude(x, 3)"),
         ("amplitude(x, 0)", "the harmonic is a positive number"),
-        ("amplitude(x, 1/2)", "an orbit of 1 period(s) has the harmonics 1/1"),
+        ("amplitude(x, 1/2)", "an orbit of 1 period has the harmonics 1/1"),
         ("stops + 1", "'stops' is a list of numbers"),
         ("x_max.real", "a dot can only stand in a number"),
         ("mean(1/(x - x))", "has no finite value in segment 1"),
@@ -176,7 +176,7 @@ def test_rows_show_any_quantity(branch: cf.Branch) -> None:
     assert branch.plot(row="sticking").get_ylabel() == "sticking share"
     line = branch.plot(row=lambda o: 2.0 * o.x_max).lines[0]
     assert np.nanmax(np.asarray(line.get_ydata(), dtype=float)) > 2.0
-    with pytest.raises(ParameterError, match="no row 'x' in a diagram"):
+    with pytest.raises(ParameterError, match="'x' varies along an orbit"):
         branch.plot(row="x")
 
 

@@ -90,6 +90,13 @@ def test_it_is_a_table_a_figure_and_a_file(edge: Any, tmp_path: Path) -> None:
     assert ax.get_xlabel() == "$x$"
     texts = [text.get_text() for text in ax.get_legend().get_texts()]
     assert texts == ["stable set", f"{edge.orbit.name}, unstable"]
+    below = cf.basins(
+        "coulomb", {name: np.linspace(*r, 6) for name, r in RANGES.items()}, PARAMS
+    ).plot()
+    known = [text.get_text() for text in below.get_legend().get_texts()]
+    for _ in range(2):
+        edge.plot(ax=below)
+    assert [text.get_text() for text in below.get_legend().get_texts()] == [*known, *texts]
     cf.save(edge, tmp_path / "edge.npz")
     again = cf.load(tmp_path / "edge.npz")
     np.testing.assert_array_equal(again.points, edge.points)

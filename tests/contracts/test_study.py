@@ -215,7 +215,7 @@ def test_bridges_are_switched_off(tmp_path, write) -> None:
         "- bridges: branches end where the Poincare map is discontinuous: switched off (bridges: false)"
         in text
     )
-    assert "Omega from 0.45 to 0.56, of up to 16 period(s)" in text
+    assert "Omega from 0.45 to 0.56, of up to 16 periods" in text
     record = cf.run_study(path, tmp_path / "out").info
     assert not any(branch["bridge"] for branch in record["branches"])
     assert len(record["loose_ends"]) > 0
@@ -434,7 +434,7 @@ def test_start_from_a_given_state(tmp_path, write) -> None:
     result = cf.run_study(write(HEAD + start), tmp_path / "out")
     assert result.orbit is not None
     assert result.orbit.name == "1a"
-    with pytest.raises(cf.ConvergenceError, match=r"an orbit of 1 period\(s\), not 2"):
+    with pytest.raises(cf.ConvergenceError, match=r"an orbit of 1 period, not 2"):
         cf.run_study(write(HEAD + "start: {simulate: {periods: 2}}\n"), tmp_path / "two")
     assert not (tmp_path / "two").exists()
 

@@ -178,6 +178,8 @@ def test_overlay() -> None:
     bare = diagram.plot(row="x_max")
     ax = diagram.plot(row="x_max", overlay=sweep)
     assert len(ax.lines) == len(bare.lines) + 2
+    names = [[text.get_text() for text in a.get_legend().get_texts()] for a in (ax, bare)]
+    assert set(names[0]) - set(names[1]) == {"simulated (sweep)"}
     x, y = (np.asarray(d) for d in ax.lines[1].get_data())
     assert (x.min(), x.max()) == pytest.approx((0.45, 0.55))
     solved = cf.find_orbit("coulomb", {**orbit.params, "Omega": float(x[0])})

@@ -23,7 +23,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
-from contfric.errors import ContfricError
+from contfric.errors import ContfricError, number_and
 from contfric.events.bifurcation import Bifurcation, EndReason, Kind
 from contfric.events.incident.unit import unit_of
 from contfric.events.local.touching import leads_elsewhere
@@ -81,7 +81,7 @@ class Balance:
 
     def __str__(self) -> str:
         return (
-            f"{self.label} at {self.value:.10g}, orbits of {self.periods} period(s): "
+            f"{self.label} at {self.value:.10g}, orbits of {number_and(self.periods, 'period')}: "
             f"{self.below} below, {self.above} above"
         )
 

@@ -14,6 +14,7 @@ from contfric.base.shown import Shown
 from contfric.base.tabled import stacked
 from contfric.curves.curve import Curve
 from contfric.curves.special import SpecialPoint
+from contfric.errors import number_and
 from contfric.events.bifurcation import Kind
 from contfric.models.definition import Model
 
@@ -169,8 +170,8 @@ class Plane(Shown):
     def __repr__(self) -> str:
         one, other = self.parameters
         return (
-            f"<Plane {one}-{other} of {self.model.name}: {len(self.curves)} curves, "
-            f"{len(self.special)} special points, {len(self.regions)} regions>"
+            f"<Plane {one}-{other} of {self.model.name}: {number_and(len(self.curves), 'curve')}, "
+            f"{number_and(len(self.special), 'special point')}, {number_and(len(self.regions), 'region')}>"
         )
 
 

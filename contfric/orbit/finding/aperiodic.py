@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from contfric.errors import AperiodicError, ConvergenceError, ParameterError
+from contfric.errors import AperiodicError, ConvergenceError, ParameterError, number_and
 from contfric.models.check.period import undeclared_angles
 from contfric.models.check.probe import Probe
 from contfric.models.definition import Model
@@ -89,9 +89,10 @@ def goes_round(trajectory: Trajectory, done: int) -> str:
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     return (
-        f"the solution at {where} has not converged in {done} periods: it still changes by {mismatch:.1g} "
-        f"in {turns} period(s), more slowly than any exponential. The orbit is marginally stable (a "
-        "multiplier is 1), as orbits of a continuum are. Move a parameter a little, or add damping"
+        f"the solution at {where} has not converged in {done} periods: it still changes by "
+        f"{mismatch:.1g} in {number_and(turns, 'period')}, more slowly than any exponential. The orbit is "
+        "marginally stable (a multiplier is 1), as orbits of a continuum are. Move a parameter a "
+        "little, or add damping"
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contfric.base.arrays import FloatArray
-from contfric.errors import ConvergenceError, function_of, real_number, whole_number
+from contfric.errors import ConvergenceError, function_of, number_and, real_number, whole_number
 from contfric.models import ModelSource, Parameters
 from contfric.models.definition import Model
 from contfric.models.tied import tied
@@ -260,7 +260,7 @@ def _is_steady(trajectory: Trajectory) -> bool:
 def _wanted(orbit: Orbit, periods: int | None) -> Orbit:
     if periods is not None and orbit.periods != periods:
         raise ConvergenceError(
-            f"the solution converges to an orbit of {orbit.periods} period(s), not {periods}: "
+            f"the solution converges to an orbit of {number_and(orbit.periods, 'period')}, not {periods}: "
             f"ask for periods={orbit.periods}, or start elsewhere (state=...)",
             orbit,
         )

@@ -55,7 +55,7 @@ def title_label(title: str, names: Sequence[str]) -> str:
 
 
 def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> str:
-    r"""Return a title with symbols, and below it the fixed parameters that it does not name, but zeros.
+    r"""Return a title with symbols, and below it the fixed parameters that it does not name.
 
     Examples
     --------
@@ -71,18 +71,29 @@ def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> 
     return "\n".join(filter(None, lines))
 
 
-def fixed_text(fixed: Mapping[str, float]) -> str:
-    r"""Return parameters and their values as a title, in lines that fit; those that are 0 are left out.
+def told(fixed: Mapping[str, float], defaults: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters that a title tells: not what is 0 and is 0 by default, a term that is not used.
 
     Examples
     --------
-    >>> fixed_text({"S": 0.32, "S0": 0.4, "h": 0.0})
+    >>> told({"S": 0.32, "zeta": 0.0, "h": 0.0}, {"S": 0.32, "zeta": 0.1, "h": 0.0})
+    {'S': 0.32, 'zeta': 0.0}
+    """
+    return {n: v for n, v in fixed.items() if v != 0.0 or defaults.get(n, 0.0) != 0.0}
+
+
+def fixed_text(fixed: Mapping[str, float]) -> str:
+    r"""Return parameters and their values as a title, in lines that fit.
+
+    Examples
+    --------
+    >>> fixed_text({"S": 0.32, "S0": 0.4})
     '$S$ = 0.32, $S_{0}$ = 0.4'
     >>> fixed_text({f"number{k}": k for k in range(1, 12)}).count("\n")
     2
     """
     lines = [""]
-    for part in (f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items() if v != 0.0):
+    for part in (f"{parameter_label(n)} = {v:.6g}" for n, v in fixed.items()):
         longer = f"{lines[-1]}, {part}" if lines[-1] else part
         if len(re.sub(r"[${}\\]", "", longer)) <= _LINE:
             lines[-1] = longer

@@ -23,6 +23,9 @@ GREY = "#6E6E6E"
 #: Colours of the four typical branches; the others take `_OTHERS` in the order of their names. These four
 #: differ in lightness, too, and the first three others from them to every kind of colour blindness.
 _TYPICAL = {"2s": "#005A9C", "0s": BLACK, "1a": VERMILLION, "2a": "#3DBE95"}
+#: The grey, from black to white, that the colour of a branch of unknown stability is mixed with, and its
+#: share. A thin solid line in it is not taken for one of a stable branch, and its hue is still seen.
+_UNKNOWN_GREY, _UNKNOWN_SHARE = 0.6, 0.55
 #: Brightness of a colour that is used a second time.
 _DARKER = 0.6
 _OTHERS = ("#8000E6", "#66331A", "#CC99FF", ORANGE, "#1A1A8C", "#A50F15", SKY)
@@ -142,9 +145,9 @@ def row_of(asked: QuantityLike, model: Model | None) -> DiagramRow:
         return _in_units(ROWS[asked], asked, model)
     names = [*NAMED, *(n for n, _ in model.quantities)] if model is not None else [*ROWS]
     word = isinstance(asked, str) and asked.isidentifier()
-    if model is None or (word and asked not in names):
+    found = quantity_of(asked, model) if model is not None else None
+    if found is None or (word and asked not in names):
         raise ParameterError(f"no row '{asked}' in a diagram{did_you_mean(asked, names)}")
-    found = quantity_of(asked, model)
     label = found.name.rpartition(":")[-1] if found.named is None else found.named.label
     return DiagramRow(label, found.even)
 
@@ -155,8 +158,8 @@ def lighter(colour: str, share: float = 0.45) -> str:
 
 
 def greyish(colour: str) -> str:
-    """Return a colour mixed with grey."""
-    return _mixed(colour, 0.6, 0.55)
+    """Return a colour mixed with grey: that of a branch whose stability is not known."""
+    return _mixed(colour, _UNKNOWN_GREY, _UNKNOWN_SHARE)
 
 
 def _mixed(colour: str, other: float, share: float) -> str:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from contfric.base.arrays import FloatArray
 from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
 from contfric.plot.appearance.names import event_label, parameter_label
 from contfric.plot.appearance.save import axes_or_new
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
 
 #: Relative: bifurcations of one kind this near in the parameter, on the same branches, are mirror images.
 _SAME = 1e-9
+#: Marks are at least so far apart, where neighbouring nodes are about 1 apart; one that would be nearer is
+#: moved by this share of the way to one of its nodes.
+_APART, _ASIDE = 0.25, 0.4
 
 _Place = tuple[float, float]
 
@@ -65,14 +69,15 @@ def plot_branch_graph(diagram: Diagram, ax: Axes | None = None) -> Axes:
     branches, node_of = _nodes(diagram.branches)
     joints = _joints(diagram, node_of)
     places = _places(len(branches), joints)
-    for joint in joints:
-        for start, end in _lines(joint, places):
+    middles = _middles(joints, places)
+    for joint, middle in zip(joints, middles, strict=True):
+        for start, end in _lines(joint, places, middle):
             new.plot(*zip(start, end, strict=True), color=GREY, linewidth=1.0, zorder=1)
     colours = branch_colours(b.name for b in branches if not b.bridge)
     for branch, place in zip(branches, places, strict=True):
         colour = BRIDGE_COLOUR if branch.bridge else colours[branch.name]
         draw_node(new, branch.name, place, colour, faded=False)
-    anchors = _events(new, joints, places, diagram.parameter)
+    anchors = _events(new, joints, middles, diagram.parameter)
     frame_nodes(new, places)
     lay_out(new)
     place_labels(new, anchors)
@@ -136,32 +141,58 @@ def _lying(points: np.ndarray) -> np.ndarray:
     return np.asarray(turned * np.where(turned[0] > 0.0, -1.0, 1.0))
 
 
-def _lines(joint: _Joint, places: Sequence[_Place]) -> list[tuple[_Place, _Place]]:
+def _lines(joint: _Joint, places: Sequence[_Place], middle: _Place) -> list[tuple[_Place, _Place]]:
     """Return the lines of an edge: one between two nodes, an arm to each of more."""
     ends = [places[k] for k in joint.nodes]
     if len(ends) == 2:
         return [(ends[0], ends[1])]
-    middle = _middle(joint, places)
     return [(middle, end) for end in ends]
 
 
-def _middle(joint: _Joint, places: Sequence[_Place]) -> _Place:
-    x, y = np.mean([places[k] for k in joint.nodes], axis=0)
-    return float(x), float(y)
+def _middles(joints: Sequence[_Joint], places: Sequence[_Place]) -> list[_Place]:
+    """Return where each bifurcation is marked: in the middle of what it joins, or nearer to one of its ends.
+
+    Edges that cross in their middles would else have one mark, as if all of their branches met there.
+    """
+    taken: list[FloatArray] = []
+    lines = {
+        k: (np.array(places[j.nodes[0]]), np.array(places[j.nodes[1]]))
+        for k, j in enumerate(joints)
+        if len(j.nodes) == 2
+    }
+    for index, joint in enumerate(joints):
+        ends = np.array([places[k] for k in joint.nodes])
+        twins = [k for k, other in enumerate(joints) if other.nodes == joint.nodes]
+        if len(twins) > 1:  # they share a line
+            w = (twins.index(index) + 1.0) / (len(twins) + 1.0)
+            tried = [ends[0] + w * (ends[1] - ends[0])]
+        else:
+            middle = ends.mean(axis=0)
+            tried = [middle, *(middle + _ASIDE * (end - middle) for end in ends)]
+        others = [(at, at) for at in taken]
+        others += [(p, p) for k, p in enumerate(map(np.array, places)) if k not in joint.nodes]
+        others += [
+            lines[k] for k, other in enumerate(joints) if other.nodes != joint.nodes and k in lines
+        ]
+        free = [min((_distance(at, *o) for o in others), default=np.inf) for at in tried]
+        first = next((k for k, far in enumerate(free) if far > _APART), int(np.argmax(free)))
+        taken.append(tried[first])
+    return [(float(x), float(y)) for x, y in taken]
+
+
+def _distance(at: FloatArray, one: FloatArray, other: FloatArray) -> float:
+    """Return the distance of a point from a line between two points."""
+    way = other - one
+    share = float(np.clip(np.dot(at - one, way) / max(float(np.dot(way, way)), 1e-300), 0.0, 1.0))
+    return float(np.hypot(*(at - one - share * way)))
 
 
 def _events(
-    ax: Axes, joints: Sequence[_Joint], places: Sequence[_Place], parameter: str
+    ax: Axes, joints: Sequence[_Joint], middles: Sequence[_Place], parameter: str
 ) -> list[Anchor]:
-    """Mark each bifurcation in the middle of what it joins, and return its label."""
+    """Mark each bifurcation, and return its label."""
     anchors: list[Anchor] = []
-    for index, joint in enumerate(joints):
-        middle = _middle(joint, places)
-        twins = [k for k, other in enumerate(joints) if other.nodes == joint.nodes]
-        if len(twins) > 1:  # they share a line
-            one, other = (places[k] for k in joint.nodes[:2])
-            w = (twins.index(index) + 1.0) / (len(twins) + 1.0)
-            middle = (one[0] + w * (other[0] - one[0]), one[1] + w * (other[1] - one[1]))
+    for joint, middle in zip(joints, middles, strict=True):
         draw_event(ax, joint.event, middle)
         name = f"{event_label(joint.event.label)}\n{parameter_label(parameter)} = {joint.value:.5g}"
         anchors.append(Anchor(*middle, name))

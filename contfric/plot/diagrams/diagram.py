@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contfric.plot.appearance.labels import lay_out
-from contfric.plot.appearance.names import full_title, parameter_label
+from contfric.plot.appearance.names import full_title, parameter_label, told
 from contfric.plot.appearance.save import (
     axes_or_new,
     figure_or_new,
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 _COLUMN, _TICKS = 4.5, 5
 #: Space above and below what is drawn, as a share of its height.
 _MARGIN = 0.12
+#: A branch that grows without bound leaves the axes this share of the range of the branches before its end.
+_RESONANCE = 0.05
 #: Ratio of a multiplier to the next smaller one above which it is without bound: between two points of a
 #: branch a multiplier grows by less, and at a grazing impact it is what rounding leaves of infinity, 1e13.
 _SPIKE = 1e6
@@ -130,7 +132,12 @@ def plot_diagram_row(
     """
     row_of(row, model_of(diagram.branches))  # before a figure is opened for it
     found = diagram.bifurcations if events else ()
-    look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
+    look = Look.of(
+        *(diagram.branches, names, colours, linestyles),
+        legend=legend,
+        inset=inset,
+        overlay=overlay is not None,
+    )
     new = axes_or_new(ax)
     new.set_xlim(*diagram.range)
     draw_overlay([new], [row], diagram.parameter, overlay)
@@ -178,7 +185,12 @@ def plot_diagram(
     >>> axes = plot_diagram(cf.explore(orbit, "Omega", (0.4, 0.6)), rows=("x_max", "psi"))
     """
     looks = [row_of(row, model_of(diagram.branches)) for row in rows]
-    look = Look.of(diagram.branches, names, colours, linestyles, legend=legend, inset=inset)
+    look = Look.of(
+        *(diagram.branches, names, colours, linestyles),
+        legend=legend,
+        inset=inset,
+        overlay=overlay is not None,
+    )
     fig = figure_or_new(fig, 8.4, 1.2 + 2.4 * len(rows))
     axes = list(fig.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0])
     axes[0].set_xlim(*diagram.range)
@@ -208,13 +220,13 @@ def plot_diagram(
 
 
 def fixed_parameters(branches: Sequence[Branch]) -> dict[str, float]:
-    """Return the parameters that do not vary and are not zero, for a title."""
+    """Return the parameters that do not vary, as a title tells them."""
     if not branches:
         return {}
     first = branches[0]
     shown = first.model.mapping(first.vector)
     shown.pop(first.parameter, None)
-    return {n: v for n, v in shown.items() if v != 0.0}
+    return told(shown, first.model.defaults)
 
 
 def _plot_row(
@@ -279,6 +291,8 @@ def draw_row(
     ax.margins(y=_MARGIN)
     if row == "multiplier":
         _cut_spikes(ax)
+    else:
+        _cut_resonances(ax, branches)
     displacement = branches[0].model.states[0] if branches else "x"
     across = parameter_label(branches[0].parameter) if branches else None
     name_axes(ax, across, label.name(displacement))
@@ -296,6 +310,25 @@ def _cut_spikes(ax: Axes) -> None:
     spikes = np.flatnonzero(sizes[1:] > _SPIKE * sizes[:-1])
     if len(spikes):
         ax.set_ylim(0.0, (1.0 + _MARGIN) * sizes[spikes[0]])
+
+
+def _cut_resonances(ax: Axes, branches: Sequence[Branch]) -> None:
+    """Let lines leave the axes where a branch grows without bound: what is not near to it is to be seen."""
+    ends = [(b.values[0], b.values[-1]) for b in branches]
+    at = [
+        x[side]
+        for x, b in zip(ends, branches, strict=True)
+        for side, end in enumerate(b.ends)
+        if end.reason.name == "UNBOUNDED"
+    ]
+    if not at:
+        return
+    names = {b.name for b in branches}
+    x, y = np.concatenate([line.get_xydata() for line in ax.lines if line.get_gid() in names]).T
+    far = np.min(np.abs(x[:, None] - at), axis=1) > _RESONANCE * np.ptp(ends)
+    shown = y[far & np.isfinite(y)]
+    if len(shown) and np.ptp(shown) > 0.0:
+        ax.set_ylim(shown.min() - _MARGIN * np.ptp(shown), shown.max() + _MARGIN * np.ptp(shown))
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:

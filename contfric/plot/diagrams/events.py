@@ -78,9 +78,16 @@ def marks_of(
 
 
 def _at_end(branch: Branch, event: Bifurcation, row: QuantityLike) -> FloatArray:
-    """Return a quantity as a branch counts it that ends at an event with a shorter period; else nothing."""
+    """Return a quantity of a branch that ends at an event, where it has another one than the event's orbit.
+
+    That is so for an orbit of more periods, and for multipliers, which jump there.
+    """
     for side, end in enumerate(branch.ends):
-        if end.bifurcation is event and branch.system.periods > event.orbit.periods:
+        if end.bifurcation is not event:
+            continue
+        if row == "multiplier":
+            return np.asarray(quantity(branch, row)[-side])
+        if branch.system.periods > event.orbit.periods:
             return counted(branch, event, quantity(event.orbit, row), quantity(branch, row)[-side])
     return np.empty(0)
 

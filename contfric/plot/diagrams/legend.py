@@ -25,6 +25,7 @@ from contfric.plot.appearance.style import (
 from contfric.plot.diagrams.events import Mark
 from contfric.plot.diagrams.inset import WIDTH, crowd
 from contfric.plot.diagrams.look import Look
+from contfric.plot.response import overlay_handle
 
 if TYPE_CHECKING:
     from contfric.continuation.branch import Branch
@@ -71,6 +72,8 @@ def handles_of(
     kinds: dict[str, str] = {}
     for m in (m for window in windows for m in _seen(marks, *window)):
         kinds[m.kind.value] = either(kinds.get(m.kind.value, ""), m.meaning)
+    if look.overlay:
+        handles.append(overlay_handle())
     order = [*MARKERS, *(k for k in kinds if k not in MARKERS)]
     return handles + [_marker(k, kinds[k]) for k in order if k in kinds]
 

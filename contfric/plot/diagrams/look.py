@@ -30,13 +30,17 @@ _STYLES: dict[str, LineStyle] = {
 
 @dataclass(frozen=True)
 class Look:
-    """How a diagram is drawn: legend, insets, names and colours by signature, line styles by stability."""
+    """How a diagram is drawn: legend, insets, names and colours by signature, line styles by stability.
+
+    ``overlay`` tells whether points of a sweep are drawn, too.
+    """
 
     legend: bool
     names: Mapping[str, str]
     colours: Mapping[str, str]
     styles: Mapping[str, LineStyle]
     inset: Inset = False
+    overlay: bool = False
 
     @classmethod
     def of(
@@ -48,6 +52,7 @@ class Look:
         *,
         legend: bool,
         inset: Inset = False,
+        overlay: bool = False,
     ) -> Look:
         """Return the look of some branches; bridges have one colour and one name.
 
@@ -68,7 +73,8 @@ class Look:
         own = branch_colours(regular)
         shown = {name: (colours or {}).get(name, own[name]) for name in regular}
         called = {name: (names or {}).get(name, name) for name in regular}
-        return cls(legend, called, shown, _styles(linestyles or {}), checked_inset(inset))
+        styles = _styles(linestyles or {})
+        return cls(legend, called, shown, styles, checked_inset(inset), overlay)
 
 
 def _styles(given: Mapping[str, Any]) -> Mapping[str, LineStyle]:

@@ -136,11 +136,13 @@ def _change(branch: Branch, columns: FloatArray, k: int) -> _Vertex:
 def _event_vertex(
     branch: Branch, event: Bifurcation, columns: FloatArray, row: QuantityLike
 ) -> _Vertex:
+    # at the end of a branch the map from there on is another one, and multipliers jump: its own are drawn
     arc = _position(branch, event)
     near = np.array([np.interp(arc, branch.arc, column) for column in columns.T])
     known = np.isfinite(near) | (len(near) == 1)
     y = near.copy()
-    y[known] = aligned(counted(branch, event, quantity(event.orbit, row), near), near[known])
+    if not (row == "multiplier" and any(end.bifurcation is event for end in branch.ends)):
+        y[known] = aligned(counted(branch, event, quantity(event.orbit, row), near), near[known])
     x = event.params[branch.parameter]
     sides = event.stable_before, event.stable_after
     if event.kind.value != "SN" and _falls(branch, arc):  # told upward, but drawn along the branch

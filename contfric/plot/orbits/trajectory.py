@@ -23,13 +23,17 @@ if TYPE_CHECKING:
 
 #: Widths of lines; many turns over each other are told apart by thin ones.
 _THIN, _POINT = 0.8, 3.0
+#: Points between two events, on average, that make curves smooth; how many there are at least and at most.
+_EACH, _LEAST_POINTS, _MOST_POINTS = 50, 1000, 100_000
 #: Share of the period that the tail after a moving point shows.
 _TAIL = 0.08
 #: Frames of an animation: minutes of film, and what a gif of some megabytes holds.
 _MOST_FRAMES = 2000
 
 
-def plot_trajectory(trajectory: Trajectory, ax: Axes | None = None, points: int = 1000) -> Axes:
+def plot_trajectory(
+    trajectory: Trajectory, ax: Axes | None = None, points: int | None = None
+) -> Axes:
     """Draw a trajectory in the plane of the first two states (one alone: over time), coloured by mode.
 
     Parameters
@@ -37,8 +41,8 @@ def plot_trajectory(trajectory: Trajectory, ax: Axes | None = None, points: int 
     trajectory : Trajectory
     ax : Axes, optional
         Where to draw; new axes by default.
-    points : int
-        About how many points to draw.
+    points : int, optional
+        About how many points to draw; by default so many that curves are smooth, up to 100,000.
 
     Examples
     --------
@@ -47,6 +51,8 @@ def plot_trajectory(trajectory: Trajectory, ax: Axes | None = None, points: int 
     >>> plot_trajectory(found).get_xlabel()
     '$x$'
     """
+    if points is None:
+        points = min(_MOST_POINTS, max(_LEAST_POINTS, _EACH * len(trajectory)))
     columns = trajectory.columns(points)
     states = trajectory.model.states
     across, up = ("t", states[0]) if len(states) == 1 else states[:2]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from contfric.base.yaml_schema import Truth, keys_of, whole
+from contfric.errors import number_and
 from contfric.study.tasks.one_parameter import OneParameter
 from contfric.study.tasks.task import Job, SeedsEntry, Skipped
 from contfric.study.wanted import Want
@@ -41,7 +42,11 @@ class ExploreTask(OneParameter):
 
     def does(self, study: Study) -> str:
         """Return the branches in words."""
-        more = [] if self.max_periods is None else [f"of up to {self.max_periods} period(s)"]
+        more = (
+            []
+            if self.max_periods is None
+            else [f"of up to {number_and(self.max_periods, 'period')}"]
+        )
         more += ["explored again from its own branches"] if self.verify else []
         return f"every branch that can be reached, {self.where(study, *more)}"
 

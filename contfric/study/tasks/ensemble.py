@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Events and classes that the summary lists; the record has all of them.
 _MOST = 12
+#: Events of a class in its line.
+_MOST_IN_LINE = 8
 
 
 class EnsembleTask(Response, AlongParameter):
@@ -182,12 +184,19 @@ class EnsembleTask(Response, AlongParameter):
         rows = [["share", "95 % interval", "list of events"]]
         for c in classes[:_MOST]:
             interval = f"{c['low']:.1%} to {c['high']:.1%}"
-            rows.append([f"{c['share']:.1%}", interval, ", ".join(c["events"]) or "none"])
+            rows.append([f"{c['share']:.1%}", interval, _listed(c["events"])])
         yield from aligned(rows)
         left = max(0, len(events) - _MOST), max(0, len(classes) - _MOST)
         if any(left):
             yield f"and {left[0]} rarer events, {left[1]} rarer classes, which run.json has"
         yield from incomplete(entry)
+
+
+def _listed(events: list[str]) -> str:
+    """Return a list of events for a line of a terminal; `run.json` has all of it."""
+    shown = ", ".join(events[:_MOST_IN_LINE]) or "none"
+    left = len(events) - _MOST_IN_LINE
+    return f"{shown} and {left} more" if left > 0 else shown
 
 
 def ensemble_of(source: Study | str | Path, samples: Any, **options: Any) -> Ensemble:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from contfric.base.shown import aligned
 from contfric.base.yaml_schema import SchemaPart, keys_of
-from contfric.errors import ParameterError, did_you_mean
+from contfric.errors import ParameterError, did_you_mean, number_and
 from contfric.study.tables import Table, table_of
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import FigureKind, Job, StudyCheck
@@ -127,7 +127,7 @@ class FitTask(Response):
 
     def does(self, study: Study) -> str:
         """Return what is found, in words."""
-        return f"{', '.join(self.free)} from {len(self.data)} measurement(s)"
+        return f"{', '.join(self.free)} from {number_and(len(self.data), 'measurement')}"
 
     def tables(self, study: Study) -> tuple[str, ...]:
         """Return its two tables."""
@@ -163,7 +163,7 @@ class FitTask(Response):
         """Yield the parameters as a table."""
         chi_square, spare = entry["chi_square"], entry["data"] - len(entry["params"])
         reduced = f", {chi_square / spare:.4g} a degree of freedom" if spare else ""
-        yield f"fit to {entry['data']} values: chi^2 = {chi_square:.4g}{reduced}"
+        yield f"fit to {number_and(entry['data'], 'value')}: chi^2 = {chi_square:.4g}{reduced}"
         rows = [["", "value", "standard deviation"]]
         for name, value in entry["params"].items():
             rows.append([name, f"{value:.10g}", f"{entry['sigma'][name]:.2g}"])

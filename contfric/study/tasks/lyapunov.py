@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from contfric.base.yaml_schema import positive, whole
+from contfric.errors import number_and
 from contfric.study.tasks.grids import axes_text, ends_of, grid_text, values_of
 from contfric.study.tasks.response import Response
 from contfric.study.tasks.task import STATE, FigureKind, Job, StudyCheck, incomplete
@@ -88,6 +89,6 @@ class LyapunovTask(Response):
     def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
         """Yield the kinds of motion and the largest exponent."""
         found = ", ".join(f"{count} {motion}" for motion, count in entry["motions"].items())
-        yield f"exponents at {grid_text(entry)}, {entry['starts']} start(s) each: {found}"
+        yield f"exponents at {grid_text(entry)}, {number_and(entry['starts'], 'start')} each: {found}"
         yield f"largest   {entry['largest']:.6g}"
         yield from incomplete(entry)

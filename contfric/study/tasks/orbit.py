@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.yaml_schema import SchemaPart, keys_of, whole
+from contfric.errors import number_and
 from contfric.study.tables import Table, points
 from contfric.study.tasks.task import STATE, FigureKind, Found, Job, Skipped, StudyCheck, Task
 from contfric.study.wanted import COLUMNS
@@ -72,7 +73,7 @@ class Start(Task):
         if self.simulate and self.simulate.state is not None:
             text += f"; from the state {self.simulate.state}"
         if self.simulate and self.simulate.periods is not None:
-            text += f"; {self.simulate.periods} period(s)"
+            text += f"; {number_and(self.simulate.periods, 'period')}"
         if self.at:
             text += "; at rest " + ", ".join(f"{name} at {x:g}" for name, x in self.at.items())
         return text
@@ -94,7 +95,7 @@ class Start(Task):
     def compute(self, job: Job) -> Orbit:
         """Return the orbit."""
         orbit = self._orbit(job)
-        job.say(f"orbit: {orbit.name} over {orbit.periods} period(s)")
+        job.say(f"orbit: {orbit.name} over {number_and(orbit.periods, 'period')}")
         return orbit
 
     def _orbit(self, job: Job) -> Orbit:
@@ -157,7 +158,7 @@ class Start(Task):
         start = record.get("start")
         if start is not None:
             values = ", ".join(f"{name} = {value:g}" for name, value in start["params"].items())
-            yield f"start     {start['signature']} over {start['periods']} period(s), {values}"
+            yield f"start     {start['signature']} over {number_and(start['periods'], 'period')}, {values}"
             yield f"          {start['segments']}"
             yield from (f"          {rests}" for rests in start.get("rests", ()))
 

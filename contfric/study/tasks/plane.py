@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field
 
 from contfric.base.yaml_schema import keys_of, positive, whole
-from contfric.errors import did_you_mean
+from contfric.errors import did_you_mean, number_and
 from contfric.study.tables import Table
 from contfric.study.tasks.grids import pairs_of, ranges_text
 from contfric.study.tasks.task import FigureKind, Found, Job, SeedsEntry, StudyCheck, Task
@@ -113,7 +113,7 @@ class PlaneTask(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the curves, over a map of Lyapunov exponents of the same plane."""
-        from contfric.plot.appearance.names import title_label
+        from contfric.plot.appearance.names import full_title, told
         from contfric.plot.appearance.style import TEXT, sized
         from contfric.plot.lyapunov import plot_lyapunov_map
         from contfric.plot.plane import plot_plane
@@ -121,7 +121,10 @@ class PlaneTask(Task):
         plane, lmap, axes = found["plane"], found.get("lyapunov"), figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:
             plot_lyapunov_map(lmap, ax=axes)
-        axes.set_title(title_label(title, plane.model.parameter_names), fontsize=sized(TEXT))
+        names, varied = plane.model.parameter_names, plane.parameters
+        fixed = {n: v for n, v in plane.model.mapping(plane.vector).items() if n not in varied}
+        text = full_title(title, names, told(fixed, plane.model.defaults))
+        axes.set_title(text, fontsize=sized(TEXT))
         plot_plane(plane, ax=axes, legend_below=True)
 
     def entry(self, found: Plane) -> dict[str, Any]:
@@ -156,9 +159,11 @@ class PlaneTask(Task):
     @classmethod
     def lines(cls, entry: dict[str, Any]) -> Iterator[str]:
         """Yield how much was found; what it is stands in the tables."""
-        counts = (len(entry[key]) for key in ("curves", "special", "regions"))
-        text = "plane {} x {}: {} curve(s), {} point(s) of codimension two, {} region(s)"
-        yield text.format(*entry["parameters"], *counts)
+        curves = number_and(len(entry["curves"]), "curve")
+        special = number_and(len(entry["special"]), "point")
+        regions = number_and(len(entry["regions"]), "region")
+        names = " x ".join(entry["parameters"])
+        yield f"plane {names}: {curves}, {special} of codimension two, {regions}"
         yield from (f"note: {note}" for note in entry["notes"])
 
 
