@@ -8,8 +8,8 @@ M the field of the slide, w where it starts (g w = 0) and
 
 the velocity is ``v(d) = d g phi_1(d M) M w``, so that ``g phi_1(d M) M w = 0`` has the root of the branch
 only. What a slide leads by is, with that, ``d^3 g M (phi_3 - phi_2 / 2)(d M) M w`` times the rate of a state
-by v: all that the orbit after it knows of it is of third order in d. Where the slide ends in a touch, v' = 0, too:
-the derivative of ``v(d) / d`` by d, ``g M (phi_1 - phi_2)(d M) M w``, is to vanish in its place.
+by v: all that the orbit after it knows of it is of third order in d. Where the slide ends in a touch,
+v' = 0, too: the derivative of ``v(d) / d`` by d, ``g M (phi_1 - phi_2)(d M) M w``, is to vanish in its place.
 
 With these in the place of its equations the chain is regular at d = 0 (but for the parameter, whose rate is
 of the order d^2 there, of d where the slide ends in a touch); for d > 0 both have the same solutions. What

@@ -2,14 +2,14 @@ r"""The end of a tube where a slide between two rests has no length, in one box 
 
 With the equations of :mod:`contfric.certify.equations.short_slide` the chain is regular where the slide
 lasts d = 0, but for the parameter. The box holds exactly one solution for each d in [0, r] (Krawczyk's
-operator for all of them at once); for d > 0 they are those of the branch. Their rates by d are ``d^k`` times numbers that
-solve a regular system, but for the times of the slide: where that of the parameter has a sign, the parameter
-is monotone up to the end.
+operator for all of them at once); for d > 0 they are those of the branch. Their rates by d are ``d^k`` times
+numbers that solve a regular system, but for the times of the slide: where that of the parameter has a sign,
+the parameter is monotone up to the end.
 
 Inside of the slide v vanishes at both ends and nowhere else if v'' has a sign over all of it, as
 ``v(tau) = tau (tau - d) v''(xi) / 2``; if it ends in a touch, ``v(tau) = tau (tau - d)^2 v'''(xi) / 6``. From
-that follow the signs of the acceleration with which the hold before it is left, and of v' at its end. All other
-inequalities are proved over the box.
+that follow the signs of the acceleration with which the hold before it is left, and of v' at its end. All
+other inequalities are proved over the box.
 """
 
 from __future__ import annotations
@@ -255,7 +255,8 @@ def _admissible(
 ) -> Finding:
     """Return whether all orbits of a box with d > 0, or up to some, obey every inequality.
 
-    Numbers that vanish with d (at S = 0) grow with it over all of the box, and are positive at the last orbit.
+    Numbers that vanish with d (at S = 0) grow with it over all of the box, and are positive at the last
+    orbit.
     """
     left = _failing(tracer, chain, chain.x, ())
     loose = [found.name for found in left if found.what in NUMBERS]
