@@ -92,6 +92,10 @@ class Flip:
         """Return the e of an orbit (z, p) of the branch, as a share of the reach."""
         return self.split.amplitude(self.turns.of(point[:-1])) / float(self.split.reach)
 
+    def covers(self, point: Vector) -> bool:
+        """Tell whether the tube meets the box before a printed orbit (z, p), on the way to the event."""
+        return abs(self.amplitude(point)) < WITHIN
+
     def guess(self, share: float) -> Vector:
         """Return about the orbit (z, p) at a share of the reach."""
         one, other, value = self.split.at(arb(share * float(self.split.reach)))

@@ -16,7 +16,7 @@ from contfric.certify.equations.closing import closing_of
 from contfric.certify.events import EventCertificate
 from contfric.certify.inequalities.along_segments import Inequality, inequalities
 from contfric.certify.tubes.circle import has_no_pair
-from contfric.certify.tubes.leaving import WITHIN, Flip, flip_at, join, leave
+from contfric.certify.tubes.leaving import Flip, flip_at, join, leave
 from contfric.certify.tubes.passing import passes_once
 from contfric.certify.tubes.piece import UNKNOWN, Piece
 from contfric.certify.tubes.strand import Strand
@@ -180,7 +180,7 @@ class Tracer(Strand):
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
-                inside = [abs(flip.amplitude(at)) < WITHIN for at in printed]
+                inside = [flip.covers(at) for at in printed]
                 if all(inside):
                     return []
                 if inside[end]:

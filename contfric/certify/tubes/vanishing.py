@@ -45,7 +45,7 @@ from contfric.certify.inequalities.along_segments import (
     inequalities,
 )
 from contfric.certify.inequalities.sign import Path, higher, positive
-from contfric.certify.tubes.leaving import NUMBERS, Edge, slope_along
+from contfric.certify.tubes.leaving import NUMBERS, WITHIN, Edge, slope_along
 from contfric.certify.tubes.meeting import as_zero_of
 from contfric.certify.tubes.piece import UNKNOWN, Piece
 from contfric.certify.tubes.tube import orbit_in
@@ -59,6 +59,8 @@ if TYPE_CHECKING:
 _SHORT = 1e-3
 #: Halvings of the reach, and how far the orbit without the slide may be from the printed end.
 _HALVINGS, _NEAR = 24, 1e-2
+#: How far a printed orbit may be from the box next to it.
+_PRINTED = 1e-8
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
 _LEAST = 2.0**-60
 #: Half-widths of the box in units of what suffices if it is narrow, and how often others are tried.
@@ -76,6 +78,7 @@ class Vanishing:
     middle, change : about the solution (z, p) at half the reach, and its rate by d
     radii : half-widths of the box about that
     reach, least : the largest d, and the one up to which all are admissible; 0 but at limits of the parameter
+    slack : the most that the slide of a printed orbit may be too short, as events are known
     piece : what is proved in it, but for its place
     plane : normal of the planes in which the tube meets it
     """
@@ -87,6 +90,7 @@ class Vanishing:
     radii: Vector
     reach: arb
     least: arb
+    slack: float
     piece: Piece
     plane: Vector
 
@@ -95,10 +99,10 @@ class Vanishing:
         """All solutions in it."""
         return [around(c, r) for c, r in zip(self.middle, self.radii, strict=True)]
 
-    def contains(self, zero: Vector) -> bool:
-        """Tell whether some balls lie in it."""
+    def contains(self, zero: Vector, slack: float = 0.0) -> bool:
+        """Tell whether some balls lie in it, or no further from it than some slack."""
         pairs = zip(zero, self.middle, self.radii, strict=True)
-        return all(abs(x - c) < r for x, c, r in pairs)
+        return all(abs(x - c) < r + slack for x, c, r in pairs)
 
     def holds(self, zero: Vector) -> bool:
         """Tell whether a solution (z, p) in some balls is one of the box, and admissible."""
@@ -114,6 +118,11 @@ class Vanishing:
         """Return the d of an orbit (z, p) of the branch, as a share of the reach."""
         return float(((point[self.at[1]] - point[self.at[0]]) / self.reach).mid())
 
+    def covers(self, point: Vector) -> bool:
+        """Tell whether the tube meets the box before a printed orbit (z, p), which lies in it."""
+        late = bool(point[self.at[1]] - point[self.at[0]] > -self.slack)
+        return late and self.amplitude(point) < WITHIN and self.contains(point, _PRINTED)
+
     def guess(self, share: float) -> Vector:
         """Return about the orbit at a share of the reach."""
         off = self.reach * (share - 0.5)
@@ -126,7 +135,7 @@ def vanishing_at(tracer: Tracer, proofs: list[EventCertificate], end: int) -> Va
     m, system, segments = tracer.segments.states + 1, tracer.system, tracer.segments
     lasts = [float((near[k + m] - near[k]).mid()) for k in range(0, (segments.count - 1) * m, m)]
     model, best = tracer.build(near[-1]), None
-    for i in (k for k, d in enumerate(lasts) if d < _SHORT):
+    for i in (k for k, d in enumerate(lasts) if -tracer.end < d < _SHORT):
         place = short_slide(system, segments, model, i)
         if place is None:
             continue
@@ -137,7 +146,7 @@ def vanishing_at(tracer: Tracer, proofs: list[EventCertificate], end: int) -> Va
         reach = float((far[at[1]] - far[at[0]]).mid())
         for _ in range(_HALVINGS if reach > 0 else 0):
             tracer.count += 1
-            found = _box(tracer, place, near, reach, last)
+            found = box_up_to(tracer, place, near, reach, last)
             if found is not None:
                 best = _with_event(tracer, found, proofs, end)
                 if found.piece.regular or not tracer.goes_on():
@@ -150,12 +159,12 @@ def _last(tracer: Tracer, place: ShortSlide, near: Vector) -> Vector | None:
     """Return balls of the orbit next to a printed end, a little before it, with the duration of its slide."""
     m = tracer.segments.states + 1
     at = place.segment * m, (place.segment + 1) * m
-    point = _solved(tracer, place, near, (near[at[1]] - near[at[0]] + tracer.end).mid())
+    point = solution_with(tracer, place, near, (near[at[1]] - near[at[0]] + tracer.end).mid())
     plane = [arb(int(k == at[1]) - int(k == at[0])) for k in range(len(near))]
     return None if point is None else orbit_in(tracer.segments, tracer.build, point, plane)
 
 
-def _solved(tracer: Tracer, place: ShortSlide, near: Vector, d: arb) -> Vector | None:
+def solution_with(tracer: Tracer, place: ShortSlide, near: Vector, d: arb) -> Vector | None:
     """Return the solution whose slide lasts d, next to a point: exact numbers, or None."""
 
     def equations(x: Vector) -> tuple[Vector, arb_mat]:
@@ -180,11 +189,11 @@ def _equations(tracer: Tracer, place: ShortSlide, x: Vector, d: arb) -> tuple[Ve
     return [*residual, length - d], arb_mat([*rows, last])
 
 
-def _box(
+def box_up_to(
     tracer: Tracer, place: ShortSlide, near: Vector, reach: float, end: Vector | None
 ) -> Vanishing | None:
     """Return the box up to d = reach, or None if it is not proved."""
-    middle = _solved(tracer, place, near, arb(reach) / 2)
+    middle = solution_with(tracer, place, near, arb(reach) / 2)
     if middle is None:
         return None
     residual, jacobian = _equations(tracer, place, middle, arb(0, reach / 2) + arb(reach) / 2)
@@ -209,7 +218,8 @@ def _box(
             widths = [arb(float(r)) for r in radii]
             piece = _piece(tracer, place, box, arb(reach), end)
             least = arb(0) if end is None else end[at[1]] - end[at[0]]
-            return Vanishing(place, at, middle, change, widths, arb(reach), least, piece, plane)
+            reaches = arb(reach), least, tracer.end
+            return Vanishing(place, at, middle, change, widths, *reaches, piece, plane)
         wanted = supersolution(gap, moved)
         if wanted is None:
             return None
@@ -341,7 +351,7 @@ def _with_event(
     tracer: Tracer, found: Vanishing, proofs: list[EventCertificate], end: int
 ) -> Vanishing:
     """Return a box with the labels of the proved events whose orbit is that without the slide."""
-    at_end = _solved(tracer, found.place, found.guess(0.0), arb(0))
+    at_end = solution_with(tracer, found.place, found.guess(0.0), arb(0))
     if at_end is None:
         return found
     labels = []
