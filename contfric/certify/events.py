@@ -47,6 +47,8 @@ from contfric.orbit.orbit import Orbit
 _BITS = (160, 320)
 #: Bits of the working precision that rounding may take.
 _SPARE = 30
+#: An extended system with a larger inverse at its zero is said to be singular: 1e4 is usual.
+_SINGULAR = 1e12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -224,7 +226,7 @@ def _attempt(
     equations, start = _extended(event, location, segments, build)
     inclusion = enclosed(equations, [*start, arb(params[parameter])], arb(2) ** (_SPARE - bits))
     if inclusion.verdict is not Verdict.PROVED:
-        return _undecided(event, parameter, f"the extended system: {inclusion.why}")
+        return _undecided(event, parameter, f"the extended system: {_why(inclusion)}")
     value, z = inclusion.zero[-1], inclusion.zero[: orbit.joints.size]
     exact = build(arb(params[parameter]))  # at one value, and its slopes from there to the event
     between = replace(exact, slopes=build(value.union(arb(params[parameter]))).slopes)
@@ -265,6 +267,13 @@ def _extended(
         after = arb(location.after)
         return touched_within(segments, build, location.condition), [*joints, after]
     return at_joint(segments, build, location.condition), joints
+
+
+def _why(inclusion: Inclusion) -> str:
+    """Return what kept an event from a proof, in words: mostly that its system is singular."""
+    if inclusion.inverse is not None and row_norm(inclusion.inverse) > _SINGULAR:
+        return "it is singular: the event is one of a continuum, or is not passed with speed"
+    return inclusion.why
 
 
 def _resonates(c: arb, s: arb) -> bool:

@@ -16,6 +16,7 @@ from contfric.models.balls.build import ball_model
 from contfric.models.definition import Model
 from contfric.orbit.itinerary.itineraries import half_of
 from contfric.orbit.orbit import Orbit
+from contfric.signature.holds import is_hold
 
 #: A segment shorter than this has vanished at the event, which is located to 1e-9 at worst.
 VANISHED = 1e-7
@@ -115,7 +116,9 @@ def _lasting(
         if resets[gone] >= 0:
             exit_, margin = orbit.itinerary[gone][1], Margin.JOINT
         elif after != i and found[after][0] == mode and resets[after] < 0:
-            exit_, margin = found.pop(after)[1], Margin.INTERIOR
+            last = found.pop(after)[1]
+            if not (is_hold(exit_) and is_hold(last)):  # of two holds the first one goes on
+                exit_, margin = last, Margin.INTERIOR
         found[i] = mode, exit_
         tests = tuple(
             replace(t, margin=margin) if (t.segment, t.margin) == (i, Margin.EXIT) else t

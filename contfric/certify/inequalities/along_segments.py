@@ -50,6 +50,8 @@ class Touch:
 DURATION, JOINT, EXIT, INSIDE, ENTRY = "duration", "joint", "exit", "inside", "entry"
 #: The rate with which an observable leaves 0 at the start: a part of what is asked for inside.
 RATE = "rate at the start"
+#: The acceleration with which a hold could be left, over all of it.
+ACCELERATED = "acceleration"
 
 
 class InequalityName(NamedTuple):
@@ -256,7 +258,8 @@ def _held(
                 finding = touched(path, arb_mat([row]) * sign, order, touch.after)
             else:
                 finding = positive(path, arb_mat([row]) * sign, order, False)
-            yield Inequality(i, hold.leaves, "acceleration", finding)
+            window = partial(undecided, path, arb_mat([row]) * sign, order, 0)
+            yield Inequality(i, hold.leaves, ACCELERATED, finding, window)
 
 
 def _departs(touch: Touch, i: int) -> bool:

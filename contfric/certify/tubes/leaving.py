@@ -29,6 +29,7 @@ from contfric.certify.equations.chain import Chain, Segments
 from contfric.certify.equations.extended import Builder, EventCondition, rows_of
 from contfric.certify.equations.zeros import Closing
 from contfric.certify.inequalities.along_segments import (
+    ACCELERATED,
     DURATION,
     ENTRY,
     EXIT,
@@ -50,6 +51,7 @@ from contfric.models.balls.numbers import Vector
 
 if TYPE_CHECKING:
     from contfric.certify.tubes.tracing import Arcs, Tracer
+    from contfric.certify.tubes.vanishing import Vanishing
 
 #: Halvings of a step up to an event.
 _HALVINGS = 24
@@ -58,7 +60,7 @@ _BEYOND = 0.1
 #: Where in the box of a PD or BP its tube begins, as a share of its reach.
 WITHIN = 0.8
 #: Inequalities at joints, which may change their sign in the box of an end.
-_NUMBERS = (DURATION, JOINT, EXIT, ENTRY)
+NUMBERS = (DURATION, JOINT, EXIT, ENTRY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +82,24 @@ class Flip:
 
     def holds(self, zero: Vector) -> bool:
         """Tell whether a solution (z, p) in some balls is one of the box, and admissible."""
-        held = self.split.holds(*self.turns.of(zero[:-1]), zero[-1])
-        return held and self.piece.proved
+        return self.surrounds(zero) and self.piece.proved
+
+    def surrounds(self, zero: Vector) -> bool:
+        """Tell whether a solution (z, p) in some balls is one of the box."""
+        return self.split.holds(*self.turns.of(zero[:-1]), zero[-1])
 
     def amplitude(self, point: Vector) -> float:
         """Return the e of an orbit (z, p) of the branch, as a share of the reach."""
         return self.split.amplitude(self.turns.of(point[:-1])) / float(self.split.reach)
+
+    def covers(self, point: Vector) -> bool:
+        """Tell whether the tube meets the box before a printed orbit (z, p), on the way to the event."""
+        return abs(self.amplitude(point)) < WITHIN
+
+    def guess(self, share: float) -> Vector:
+        """Return about the orbit (z, p) at a share of the reach."""
+        one, other, value = self.split.at(arb(share * float(self.split.reach)))
+        return [*self.turns.joined(one, other), value]
 
 
 def flip_at(tracer: Tracer, turns: Turns, far: Vector) -> Flip | None:
@@ -199,18 +213,16 @@ def _is_near(edge: Edge, tracer: Tracer, box: Box, end: Vector, length: float) -
 
 
 def join(
-    tracer: Tracer, flip: Flip, first: Vector, last: Vector, arcs: Arcs, forward: bool
+    tracer: Tracer, flip: Flip | Vanishing, first: Vector, last: Vector, arcs: Arcs, forward: bool
 ) -> list[Piece]:
-    """Cover the step in which the tube meets the box of a PD or BP, and all beyond it."""
+    """Cover the step in which the tube meets the box of an end, and all beyond it."""
     far, near = (first, last) if forward else (last, first)
     shares = [flip.amplitude(point) for point in (far, near)]
     wanted = WITHIN if shares[0] > 0 else -WITHIN
-    one, other, value = flip.split.at(arb(wanted * float(flip.split.reach)))
-    guess = [*flip.turns.joined(one, other), value]
-    middle = [c.mid() for c in guess]
+    middle = [c.mid() for c in flip.guess(wanted)]
     point = solved(tracer.segments, tracer.build, tracer.plain, middle, flip.plane)
     zero = None if point is None else orbit_in(tracer.segments, tracer.build, point, flip.plane)
-    if point is None or zero is None or not flip.split.holds(*flip.turns.of(zero[:-1]), zero[-1]):
+    if point is None or zero is None or not flip.surrounds(zero):
         return tracer.cover(first, last, arcs, 0)
     share = (shares[0] - wanted) / (shares[0] - shares[1])
     start, stop = arcs if forward else arcs[::-1]
@@ -248,14 +260,14 @@ def ends_inside(edge: Edge, box: Box) -> tuple[InequalityName, ...]:
     """Return the inequalities that end the branch at one orbit of a box; none if that is not proved."""
     if box.tangent is None:
         return ()
-    loose = [found.name for found in _failing(edge, box.all, ()) if found.name.what in _NUMBERS]
+    loose = [found.name for found in _failing(edge, box.all, ()) if found.name.what in NUMBERS]
     left = _failing(edge, box.all, loose)
     rates = [found.name._replace(what=RATE) for found in left if found.what == INSIDE]
     if rates:
         still = {found.name for found in _failing(edge, box.all, [*loose, *rates])}
         loose += [name for name in rates if name._replace(what=INSIDE) not in still]
         left = [found for found in left if found.name in still]
-    if not all(found.name.what == INSIDE for found in left):
+    if not all(found.name.what in (INSIDE, ACCELERATED) for found in left):
         return ()
     sides = (False, True) if edge.forward else (True, False)
     zeros = [section(edge.segments, edge.build, box, last) for last in sides]
@@ -282,27 +294,34 @@ def _failing(
 
 def _falls(edge: Edge, box: Box, name: InequalityName, window: arb | None) -> bool:
     """Tell whether the number of an inequality falls towards the outer end, over the whole box."""
-    chain = Chain(edge.segments, edge.build(box.all[-1]))
     assert box.tangent is not None
-    z, i = chain.joints(box.all[:-1]), name.segment
-    sign = signs_of(edge.system, name)
+    slope = slope_along(edge, box.all, box.tangent, name, window)
+    return slope is not None and bool(slope < 0 if edge.forward else slope > 0)
+
+
+def slope_along(
+    edge: Edge, x: Vector, tangent: Vector, name: InequalityName, window: arb | None
+) -> arb | None:
+    """Return the rate of an inequality's number along a tangent, over some balls; None if it has none."""
+    chain = Chain(edge.segments, edge.build(x[-1]))
+    z, i, sign = chain.joints(x[:-1]), name.segment, signs_of(edge.system, name)
     if name.what == DURATION:
-        first, last = (chain.times_by(k, box.tangent) for k in (i, i + 1))
-        slope = last - first
-    elif name.what == INSIDE:
-        if window is None or sign is None or not window < chain.duration(i, z):
-            return False
-        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), 0)
-        slope = sign * dot(chain.observed_within(z, i, window, *rows)[1], box.tangent)
-    else:
-        if sign is None:
-            return False
-        starts, order = name.what in (RATE, ENTRY), int(name.what in (EXIT, RATE))
-        rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
-        if starts and edge.segments.resets[i]:
-            rows = _before_reset(chain, edge.segments.resets[i], *rows)
-        slope = sign * dot(chain.observed(z, i + int(not starts), *rows)[1], box.tangent)
-    return bool(slope < 0 if edge.forward else slope > 0)
+        first, last = (chain.times_by(k, tangent) for k in (i, i + 1))
+        return last - first
+    if sign is None:
+        return None
+    if name.what in (INSIDE, ACCELERATED):
+        if window is None or not window < chain.duration(i, z):
+            return None
+        along = [h.departs for h in edge.system.holds if (h.segment, name.what) == (i, ACCELERATED)]
+        met = EventCondition(i, name.surface, departs=along[0] if along else "")
+        rows = rows_of(chain.model, edge.segments, met, 0)
+        return sign * dot(chain.observed_within(z, i, window, *rows)[1], tangent)
+    starts, order = name.what in (RATE, ENTRY), int(name.what in (EXIT, RATE))
+    rows = rows_of(chain.model, edge.segments, EventCondition(i, name.surface), order)
+    if starts and edge.segments.resets[i]:
+        rows = _before_reset(chain, edge.segments.resets[i], *rows)
+    return sign * dot(chain.observed(z, i + int(not starts), *rows)[1], tangent)
 
 
 def _before_reset(
@@ -318,7 +337,7 @@ def signs_of(system: System, name: InequalityName) -> int | None:
     """Return the sign with which the observable of an inequality is positive where it holds."""
     layout, surfaces = system.layout, [s.name for s in system.model.surfaces]
     i = name.segment
-    if name.what == EXIT:
+    if name.what in (EXIT, ACCELERATED):
         return int(layout.exit_signs[i])
     if name.what in (JOINT, ENTRY):
         after = int(name.what == ENTRY)

@@ -20,15 +20,18 @@ from contfric.certify.equations.chain import Chain, Segments, segments_of
 from contfric.certify.equations.closing import closing_of
 from contfric.certify.equations.extended import Builder
 from contfric.certify.equations.kept import Kept
+from contfric.certify.equations.short_slide import ShortSlide
 from contfric.certify.equations.zeros import at_start, closed, in_span, zeros_at_joints
 from contfric.certify.events import EventCertificate
 from contfric.certify.inequalities.along_segments import rows_met
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, numbers
 
 #: A joint of the branch is taken for that of the event within this distance.
 _NEAR = 1e-5
+#: Steps of Newton's method towards the time at which a rest could be left.
+_NEWTON = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,12 @@ class _Cycle:
 
 
 def as_zero_of(
-    proof: EventCertificate, system: System, segments: Segments, build: Builder, near: Vector
+    proof: EventCertificate,
+    system: System,
+    segments: Segments,
+    build: Builder,
+    near: Vector,
+    short: ShortSlide | None = None,
 ) -> Vector | None:
     """Return balls that hold the event's orbit as a solution (z, p) of a branch's chain; None if it is not.
 
@@ -61,6 +69,7 @@ def as_zero_of(
     ----------
     build : the model with the phase for its time
     near : approximate solution of the chain at the event
+    short : a slide of the branch that has no length there: its equations for that case are solved, too
     """
     if proof.location is None or proof.value is None:
         return None
@@ -75,7 +84,7 @@ def as_zero_of(
     for touched in (False, True)[: 1 + _is_within(proof)]:
         cycle = _cycle(proof, model, touched)
         for dated in [] if cycle is None else cycle.dated(system.model.autonomous, near[0]):
-            found = _on(dated, system, segments, model, near)
+            found = _on(dated, system, segments, model, near, short)
             if found is not None:
                 return [*found, proof.value]
     return None
@@ -89,10 +98,20 @@ def _is_within(proof: EventCertificate) -> bool:
 
 
 def _on(
-    cycle: _Cycle, system: System, segments: Segments, model: BallModel, near: Vector
+    cycle: _Cycle,
+    system: System,
+    segments: Segments,
+    model: BallModel,
+    near: Vector,
+    short: ShortSlide | None = None,
 ) -> Vector | None:
     """Return the joints of a chain that the event's orbit solves, next to some; None if it does not."""
     m, count = segments.states + 1, segments.count
+    if short is not None and not short.touches:
+        left = _left(cycle, segments, model, near, short.segment)
+        if left is None:
+            return None
+        cycle = left
     found: list[tuple[int, int]] = []
     for i in range(count):
         at = _matched(cycle, near[i * m : (i + 1) * m])
@@ -101,6 +120,8 @@ def _on(
         found.append(at)
     found.append(_closed(found[0], cycle, system, near))
     if not all(_leads(cycle, model, segments, i, *found[i : i + 2]) for i in range(count)):
+        return None
+    if short is not None and not _is_left_still(cycle, segments, model, short, found):
         return None
     *joints, closed = (_moved(cycle, at) for at in found)
     end = (
@@ -171,6 +192,66 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
         turn = 2 * turn
     all_modes, all_resets = list(chain.from_iterable(modes)), list(chain.from_iterable(resets))
     return _Cycle(joints, all_modes, all_resets, known, turn, orbit.periods)
+
+
+def _left(
+    cycle: _Cycle, segments: Segments, model: BallModel, near: Vector, i: int
+) -> _Cycle | None:
+    """Return the cycle with a joint where a rest could be left without acceleration into segment i.
+
+    It is the only such time next to a printed one (interval Newton).
+    """
+    m = segments.states + 1
+    at = _matched(cycle, near[(i - 1) * m : i * m])
+    if at is None or cycle.modes[at[0]] != segments.modes[i - 1]:
+        return None
+    j, mode = at[0], segments.modes[i - 1]
+    row = model.rate(segments.exits[i], segments.modes[i])
+    start = column(model.extended(cycle.joints[j][0], cycle.joints[j][1:]))
+    field, rate = model.fields[mode], arb_mat([row]) * model.fields[mode]
+    after = (near[i * m] - _moved(cycle, at)[0]).mid()
+    for _ in range(_NEWTON):
+        state = (field * after).exp() * start
+        value, slope = (arb_mat([row]) * state)[0, 0], (rate * state)[0, 0]
+        if slope.contains(0):
+            return None
+        after = (after - value / slope).mid()
+    wide = around(after, arb(2) ** -50)
+    value = (arb_mat([row]) * (field * after).exp() * start)[0, 0]
+    slope = (rate * (field * wide).exp() * start)[0, 0]
+    if slope.contains(0):
+        return None
+    found = after - value / slope
+    if not abs(found - after) < arb(2) ** -50 or not found > 0:
+        return None
+    end = numbers((field * found).exp() * start)
+    following = cycle.joints[j + 1] if j + 1 < len(cycle.joints) else _moved(cycle, (0, 1))
+    if not cycle.joints[j][0] + found < following[0]:
+        return None
+    kept = [own for own in cycle.vanishing[j] if model.keeps(own, mode)]
+    joint = [cycle.joints[j][0] + found, *end[: m - 1]]
+    return replace(
+        cycle,
+        joints=[*cycle.joints[: j + 1], joint, *cycle.joints[j + 1 :]],
+        modes=[*cycle.modes[: j + 1], mode, *cycle.modes[j + 1 :]],
+        resets=[*cycle.resets[: j + 1], "", *cycle.resets[j + 1 :]],
+        vanishing=[*cycle.vanishing[: j + 1], [row, *kept], *cycle.vanishing[j + 1 :]],
+    )
+
+
+def _is_left_still(
+    cycle: _Cycle,
+    segments: Segments,
+    model: BallModel,
+    short: ShortSlide,
+    at: list[tuple[int, int]],
+) -> bool:
+    """Tell whether a slide has no length, and is left without acceleration there."""
+    i = short.segment
+    known, rest = cycle.vanishing[at[i][0]], model.fields[segments.modes[i - 1]]
+    row = model.rate(segments.exits[i], segments.modes[i])
+    rows = [row, numbers(arb_mat([row]) * rest)] if short.touches else [row]
+    return at[i] == at[i + 1] and all(in_span(own, known) for own in rows)
 
 
 def _matched(cycle: _Cycle, joint: Vector) -> tuple[int, int] | None:

@@ -16,12 +16,13 @@ from contfric.certify.equations.closing import closing_of
 from contfric.certify.events import EventCertificate
 from contfric.certify.inequalities.along_segments import Inequality, inequalities
 from contfric.certify.tubes.circle import has_no_pair
-from contfric.certify.tubes.leaving import WITHIN, Flip, flip_at, join, leave
+from contfric.certify.tubes.leaving import Flip, flip_at, join, leave
 from contfric.certify.tubes.passing import passes_once
 from contfric.certify.tubes.piece import UNKNOWN, Piece
 from contfric.certify.tubes.strand import Strand
 from contfric.certify.tubes.tube import Box, are_linked, box_between, section, solved
 from contfric.certify.tubes.turns import turns_of
+from contfric.certify.tubes.vanishing import Vanishing, vanishing_at
 from contfric.certify.verdict import Finding, Verdict, all_of
 from contfric.continuation.branch import Branch
 from contfric.models.balls.numbers import Vector
@@ -74,7 +75,7 @@ class Tracer(Strand):
         self._known: dict[int, Vector | None] = {}  # orbits next to printed ones, by number
         self.begin()
         self.met = self.met_by(proofs)
-        self.flips = [self._flip(proofs, end) for end in (0, -1)]
+        self.flips = [self._flip(proofs, e) or vanishing_at(self, proofs, e) for e in (0, -1)]
         self.printed_orbits = self.enclosed(points)
         self.unique = {k for k, point in enumerate(points) if point.unique.proved}
         self.held, self.obeying = set[int](), set[int]()
@@ -93,7 +94,7 @@ class Tracer(Strand):
                     return flip_at(self, turns, self.far_from(end))
         return None
 
-    def _hold(self, box: Box | Flip, arcs: Arcs | None = None) -> None:
+    def _hold(self, box: Box | Flip | Vanishing, arcs: Arcs | None = None) -> None:
         """Note which printed orbits are on the curve of a proved box, all of which is admissible.
 
         Looked at are those that may not be alone within their stated error, which is large next to a PD or
@@ -179,7 +180,7 @@ class Tracer(Strand):
         first, last = (at or raw for at, raw in zip(exact, printed, strict=True))
         for end, flip in enumerate(self.flips):
             if flip is not None and abs(arcs[1 - end] - self.branch.arc[-end]) < self.far:
-                inside = [abs(flip.amplitude(at)) < WITHIN for at in printed]
+                inside = [flip.covers(at) for at in printed]
                 if all(inside):
                     return []
                 if inside[end]:
