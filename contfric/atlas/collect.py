@@ -40,6 +40,8 @@ FINAL = frozenset(
         )
     }
 )
+#: How the reason begins why a branch of longer periods than those asked for is not followed.
+NOT_ASKED_FOR = "max_periods"
 
 
 @dataclass(eq=False)
@@ -111,9 +113,23 @@ def collect(
         tuple(nodes),
         tuple(loose),
         complete,
-        notes,
+        notes + tuple(_without_branch(event, settings) for event in events if _is_bare(event)),
         asked,
     )
+
+
+def _is_bare(event: Event) -> bool:
+    """Tell whether a branch must leave an event, and all that was tried to find it is refused."""
+    tried = [p for p in event.proposals if not p.why.startswith(NOT_ASKED_FOR)]
+    refused = tried and all(p.verdict is Decision.REFUSED for p in tried)
+    leaves = event.bifurcation.kind in (Kind.PD, Kind.BP)
+    return bool(refused and leaves and len(set(event.branches)) < 2)
+
+
+def _without_branch(event: Event, settings: Settings) -> str:
+    b = event.bifurcation
+    at = f"{b.label} at {settings.parameter} = {b.params[settings.parameter]:.9g}"
+    return f"{at}: the branch that leaves there was not found ({event.proposals[-1].why})"
 
 
 def _is_relabelling_at_end(event: Event, events: list[Event], settings: Settings) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import chain
 
-from contfric.atlas.collect import Event
+from contfric.atlas.collect import NOT_ASKED_FOR, Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving.crossings import follow_crossing, whole_branch
 from contfric.atlas.leaving.departures import NO_WIDTH, ends_at, follow_departure
@@ -379,7 +379,7 @@ def _follow_doubling(state: Exploration, event: Event) -> None:
     if any(state.branches[i].system.periods == 2 * orbit.periods for i in event.branches):
         return
     if 2 * orbit.periods > state.max_periods:
-        why = f"max_periods = {state.max_periods}"
+        why = f"{NOT_ASKED_FOR} = {state.max_periods}"
         reason = f"the branch of {2 * orbit.periods} periods"
         state.judge(event, reason, Decision.REFUSED, why=why)
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Mapping, Set
 
 import numpy as np
 
@@ -268,11 +268,7 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
     where = f"after the reset at '{name}' the solution from {probe.shown(t, y)}"
     possible = [model.domain_by_name[d] for d in model.targets.get((before.name, name), ())]
     passes = other_side(model, reset, before)
-    fits = [
-        d
-        for d in possible
-        if all(d.signs[s] == v for s, v in signs.items() if s not in reset.lands)
-    ]
+    fits = [d for d in possible if _holds(model, d, signs, reset)]
     if not fits:
         return (
             f"{where} is in no domain: {_sides(model, signs)}. Add a mode that holds there{passes}"
@@ -290,6 +286,15 @@ def _reset_fault(probe: Probe, reset: Reset, before: Domain, t: float, y: FloatA
                 f"'{observable}' around, such as v: -e*v, or lead off the surface{passes}"
             )
     return ""
+
+
+def _holds(model: Model, domain: Domain, signs: Mapping[str, int], reset: Reset) -> bool:
+    """Tell whether a domain holds where a reset leads. On the surface of another reset that acts."""
+    return all(
+        domain.signs[s] == v or (v == 0 and model.maps_at(domain, s))
+        for s, v in signs.items()
+        if s not in reset.lands
+    )
 
 
 def check_sliding(report: ModelReport, probe: Probe) -> None:

@@ -261,11 +261,39 @@ def _at(formula: Any, moving: Collection[Any], shift: int) -> Any:
 
 def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
     """Return what changes its sign at the kinks and jumps of a formula, if it depends on ``moving``."""
-    parts = (part.args[0] for part in expression.atoms(Sign, Abs, Where))
+    parts = (part.args[0] for part in _bending(expression))
     signs = {
         sign: sympy.Integer(1) for sign in expression.atoms(Sign)
     }  # where only these change, they are parts
     return sorted({x for x in parts if x.xreplace(signs).free_symbols & set(moving)}, key=str)
+
+
+def _bending(expression: Any) -> set[Any]:
+    """Return the parts of a formula that may give it a kink or a jump where their argument is 0.
+
+    A kink of a condition is none of what it decides: ``where(abs(x) > 1, a, b)`` changes at 1 and -1, and not
+    at 0. A jump of it is one.
+    """
+    found, seen = set(), set()
+    left = [(expression, False)]
+    while left:
+        part, decides = left.pop()
+        if (part, decides) in seen:
+            continue
+        seen.add((part, decides))
+        if isinstance(part, (Sign, Abs, Where)) and not (decides and _is_continuous(part)):
+            found.add(part)
+        first = decides or isinstance(part, Where)
+        left += [(x, decides or (first and k == 0)) for k, x in enumerate(part.args)]
+    return found
+
+
+def _is_continuous(part: Any) -> bool:
+    """Tell whether a part does not jump: the size of something, or the larger or smaller of two."""
+    if isinstance(part, Where):
+        d, a, b = part.args
+        return bool(d in (a - b, b - a))
+    return isinstance(part, Abs)
 
 
 #: Functions that have values and limits at all numbers, and no jumps.

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from contfric.errors import ModelError, did_you_mean
+from contfric.models.language.elsewhere import advice_on
 from contfric.models.language.products import difference, of_product
 
 T = TypeVar("T")
@@ -57,8 +58,6 @@ _ADVICE: dict[type[ast.AST], str] = {
     ast.NotEq: "a condition has one of <, <=, >, >=",
     ast.Tuple: "a comma can only separate the arguments of a function",
 }
-_STAIRCASES = ("floor", "ceil", "round", "frac", "fmod", "rint", "trunc")
-_JUMPS = "; every jump needs a surface with a mode on each side, of the time there is mod(t, T)"
 
 
 @dataclass(frozen=True)
@@ -177,7 +176,7 @@ def _check_number(node: ast.Constant, source: str) -> None:
 
 def unknown_function(name: str, known: Sequence[str], source: str) -> str:
     """Return what to say of a function that there is not."""
-    hint = _JUMPS if name in _STAIRCASES else did_you_mean(name, known)
+    hint = advice_on(name, known)
     return f"in '{_short(source)}': unknown function '{name}'{hint} (a product needs its *)"
 
 

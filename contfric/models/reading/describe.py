@@ -162,12 +162,21 @@ def _modes(
         rates = tuple(field[state] for state in states)
         found.append(ModeText(name, rates, sides, rank, bool(entry.get("derived"))))
     if not found:
-        example = ", ".join(f"{name}: -" for name in known)
-        raise EntryError(
-            ("modes",),
-            f"a model has at least one mode, such as modes: {{free: {{in: {{{example}}}}}}}",
-        )
+        raise EntryError(("modes",), _no_modes(data, known))
     return tuple(found)
+
+
+def _no_modes(data: Mapping[str, Any], known: list[str]) -> str:
+    """Return what to write where a model has no modes: with a reset those in which it acts."""
+    met = next((name for name in known if name in data["resets"]), "")
+    if not met or "field" not in data:
+        example = ", ".join(f"{name}: -" for name in known)
+        return f"a model has at least one mode, such as modes: {{free: {{in: {{{example}}}}}}}"
+    return (
+        f"a reset acts in modes. Where '{met}' is met from one side (a wall, a threshold) write "
+        f"modes: {{free: {{in: {{{met}: -}}}}}}, or +; where from both, modes: {{free: {{}}}} and "
+        f"'from: [free]' in the reset at '{met}'"
+    )
 
 
 def _domains(

@@ -39,6 +39,8 @@ _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
 #: Weak chaos is seen late, so a share of the periods that were simulated is compared, up to so many times
 #: more. An exponent of 0.005 where the frequency is 0.5 is seen after 200 periods.
 _SHARE, _LONGER = 0.1, 20
+#: Growth of states after which their events are rounding.
+_FAR = 1e12
 #: A simulation that ends on a surface is on it to rounding, or a little more at a small angle.
 _ON = 1e-9
 
@@ -103,6 +105,13 @@ def _grows(trajectory: Trajectory) -> bool:
     size = np.max(np.abs(trajectory.states), axis=1)
     tenth = max(1, len(size) // 10)
     return bool(np.max(size[-tenth:]) > _GROWTH * np.max(size[:tenth]))
+
+
+def outgrown(trajectory: Trajectory) -> str:
+    """Return that a solution has grown so large that levels are rounding next to it, or nothing."""
+    before = 1.0 + float(np.max(np.abs(trajectory.begin[1])))
+    large = float(np.max(np.abs(trajectory.last[2]))) > _FAR * before
+    return _unbounded(trajectory) if large and _grows(trajectory) else ""
 
 
 def _unbounded(trajectory: Trajectory) -> str:

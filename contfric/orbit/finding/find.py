@@ -22,11 +22,20 @@ from contfric.orbit.finding.aperiodic import (
     left_region,
     moves_on,
     out_of_range,
+    outgrown,
     stays,
     why_none,
 )
 from contfric.orbit.finding.recurrences import EXACT, orbit_come_to, recurrences
-from contfric.orbit.finding.rest import beyond_creep, check_rest, comes_to_rest, is_point, winds
+from contfric.orbit.finding.rest import (
+    beyond_creep,
+    check_rest,
+    comes_to_rest,
+    is_point,
+    quickens,
+    slides_of_order_two,
+    winds,
+)
 from contfric.orbit.finding.sizes import warn_of_sizes
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.positions.kept import Places
@@ -172,10 +181,17 @@ class _Search:
         trajectory = self._simulated(_FIRST_EVENTS if autonomous else _TURNS)
         if trajectory.end is not SimulationEnd.EVENTS:
             return trajectory
-        if not autonomous and winds(trajectory):
-            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
         if autonomous and _is_steady(trajectory):
             self.unit = float(trajectory.last[1] - trajectory.begin[0]) / self.span
+            return self._simulated(_MOST_EVENTS_AT_ONCE)
+        if autonomous:
+            trajectory = self._simulated(_TURNS)
+            if trajectory.end is not SimulationEnd.EVENTS:
+                return trajectory
+        if winds(trajectory):
+            raise ConvergenceError(comes_to_rest(trajectory), trajectory)
+        if quickens(trajectory, self.model.view(self.model.vector(self.params)).period):
+            raise ConvergenceError(slides_of_order_two(trajectory), trajectory)
         return self._simulated(_MOST_EVENTS_AT_ONCE)
 
     def _simulated(self, events: int) -> Trajectory:
@@ -277,6 +293,8 @@ def _walls_met(trajectory: Trajectory) -> list[str]:
 
 
 def _check_motion(trajectory: Trajectory) -> None:
+    if trajectory.end is SimulationEnd.IMPOSSIBLE and (why := outgrown(trajectory)):
+        raise ConvergenceError(why, trajectory)
     looks = {SimulationEnd.QUIET: goes_on, SimulationEnd.IMPOSSIBLE: left_region}
     if trajectory.end in looks and (why := looks[trajectory.end](trajectory)):
         raise ConvergenceError(f"no periodic orbit: {why}", trajectory)

@@ -32,6 +32,9 @@ _NO_SIZE = 1e-6
 #: Turns about a point: the last half of all events lie this near to each other (relative to 1 + the states),
 #: and the last quarter nearer than the one before it (by 2/3, where turns shrink like 1/n).
 _WOUND, _SHRINKS = 1e-3, 0.8
+#: Time of the last half of all events over that of the quarter before it, if they come ever faster: 1 by the
+#: law 1/n, 2 if they come evenly.
+_QUICKER = 1.3
 #: Powers of the law of a creep, and how well two estimates of it agree where it holds.
 _LEAST, _MOST, _AGREE = 0.9, 2.1, 0.1
 #: Farther by this, so that the contact sticks although the distance is an estimate.
@@ -80,6 +83,32 @@ def winds(trajectory: Trajectory) -> bool:
     near = before < _WOUND * (1.0 + np.max(np.abs(trajectory.states[-1])))
     within = trajectory.cycles[-1] - trajectory.cycles[half] <= 1
     return bool(near and within and lately < _SHRINKS * before)
+
+
+def quickens(trajectory: Trajectory, period: float) -> bool:
+    """Tell whether events follow each other faster and faster without an end, within a period.
+
+    Turns about a place that moves take times like 1/n, as those of :func:`winds`. So the last half of all
+    events takes no longer than the quarter before it, where it is twice as long if they come evenly.
+    """
+    times = trajectory.cycles * period + trajectory.times
+    quarter, half, last = (len(times) * k // 4 for k in (1, 2, 3))
+    before, lately = times[half] - times[quarter], times[-1] - times[half]
+    ends = times[last] - times[half], times[-1] - times[last]
+    within = period <= 0.0 or times[-1] - times[quarter] < period
+    return bool(within and lately < _QUICKER * before and ends[1] < _SHRINKS * ends[0])
+
+
+def slides_of_order_two(trajectory: Trajectory) -> str:
+    """Return what is said of a solution that switches without an end at a place that moves."""
+    met = sorted({surface for _, surface in trajectory.itinerary_from(-len(trajectory) // 4)})
+    where = " and ".join(f"'{name}'" for name in met)
+    return (
+        f"no periodic orbit: the solution switches at {where} faster and faster without an end, near "
+        f"{_place(trajectory.model, trajectory.states[-1])}: its rate comes to 0 with it, "
+        "and no mode slides there. Leave out what delays the switch (the lag of an actuator), so that "
+        "'sliding: filippov' has its place, or switch with hysteresis"
+    )
 
 
 def comes_to_rest(trajectory: Trajectory) -> str:
