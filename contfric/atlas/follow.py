@@ -43,6 +43,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.families.continuum import in_continuum
 from contfric.continuation.points import Settings
 from contfric.continuation.singular_points.crossing import LOCATED, crossing_near
+from contfric.events.accumulating import accumulates
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.events.incident.candidates import Candidate, sequences_of
 from contfric.events.incident.from_simulation import solutions_near
@@ -71,6 +72,10 @@ _ELSEWHERE = "it is a branch that begins at another event nearby"
 _INCOMPLETE = (
     "the chatter is not complete beyond: branches with any number of impacts come together here"
 )
+#: The same where such branches follow each other, each with one impact more.
+_ACCUMULATE = (
+    "impacts accumulate (chatter): branches with ever more of them follow each other, without end"
+)
 
 
 def follow(state: Exploration, event: Event) -> None:
@@ -94,8 +99,10 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
-    if any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests):
-        state.judge(event, "go on after the event", Decision.REFUSED, why=_INCOMPLETE)
+    settled = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
+    if settled or accumulates(event.bifurcation):
+        why = _INCOMPLETE if settled else _ACCUMULATE
+        state.judge(event, "go on after the event", Decision.REFUSED, why=why)
         return
     if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):
         reason, why = "go on after the event", EndReason.CONTINUUM.value

@@ -24,6 +24,7 @@ from contfric.continuation.families.continuum import is_continuum
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import settings_of
 from contfric.errors import ContfricError, number_and
+from contfric.events.accumulating import accumulates
 from contfric.events.bifurcation import Bifurcation, EndReason, Kind
 from contfric.events.incident.unit import unit_of
 from contfric.events.local.touching import leads_elsewhere
@@ -144,7 +145,8 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit, test) for e in events for test in e.tests):
                 below = above = None
-            if any(t.surface in e.orbit.model.settled_sides for e in events for t in e.tests):
+            settled = any(t.surface in e.orbit.model.settled_sides for e in events for t in e.tests)
+            if settled or any(accumulates(e) for e in events):
                 below = above = None  # incomplete chatter: beyond it branches are infinitely many
             lost = any(_frees(e.orbit, test) for e in events for test in e.tests)
             if lost or _ended(diagram, node, EndReason.SHAKEDOWN) is not None:
