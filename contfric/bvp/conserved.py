@@ -77,8 +77,13 @@ def kept_by(closure: FloatArray, directions: FloatArray) -> FloatArray:
 
 def _kept(still: FloatArray, changes: FloatArray) -> FloatArray:
     """Return those of some directions, orthonormal rows, along which no change has a part."""
+    parts = still @ changes
+    if (
+        np.linalg.norm(parts) <= _ZERO
+    ):  # no singular value is larger: most modes say what others said
+        return still
     # all directions, and of many changes not all of theirs
-    left, sizes, _ = np.linalg.svd(still @ changes, full_matrices=changes.shape[1] < len(still))
+    left, sizes, _ = np.linalg.svd(parts, full_matrices=changes.shape[1] < len(still))
     return np.ascontiguousarray(left[:, int(np.sum(sizes > _ZERO)) :].T @ still)
 
 
