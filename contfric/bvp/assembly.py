@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from contfric.base.attributes import cached_property
 from contfric.bvp.holds import NO_PIN, TOUCH_PIN, Hold, holds_of
@@ -19,6 +20,9 @@ from contfric.models.mode_domains import (
     mode_domains,
 )
 from contfric.signature.holds import is_hold
+
+#: Itineraries of a structure have hundreds of margins each, mostly the same ones.
+_event = cache(EventFunction)
 
 
 def following_modes(model: Model, itinerary: Itinerary, half: bool) -> list[str]:
@@ -158,11 +162,13 @@ class Assembly:
         """Rows of the joint margins."""
         rows = list[tuple[int, ...]]()
         pinned = {(hold.segment - 1, hold.pin) for hold in self.holds}
-        for i, (_, exit_) in enumerate(self.itinerary):
-            for k, surface in enumerate(self.names):
-                sign = self.ending[i].get(surface, 0)
-                if sign and surface != exit_ and (i, surface) not in pinned:
-                    rows.append((i, k, sign, 0))
+        index = {surface: k for k, surface in enumerate(self.names)}
+        for i, ((_, exit_), ending) in enumerate(zip(self.itinerary, self.ending, strict=True)):
+            rows += sorted(
+                (i, index[surface], sign, 0)
+                for surface, sign in ending.items()
+                if sign and surface != exit_ and (i, surface) not in pinned
+            )
         return rows
 
     @cached_property
@@ -175,12 +181,12 @@ class Assembly:
         """All margins, in the order of their values."""
         names = self.names
         return (
-            *(EventFunction(Margin.INTERIOR, i, names[k]) for i, k, _ in self.interior),
-            *(EventFunction(Margin.EXIT, i, exit_) for i, exit_ in enumerate(self.exits)),
-            *(EventFunction(Margin.JOINT, i, names[k]) for i, k, *_ in self.joint),
-            *(EventFunction(Margin.ENTRY, i, names[k]) for i, k, *_ in self.entries),
-            *(EventFunction(Margin.LASTING, i, surface) for i, surface in self.lasting),
-            *(EventFunction(Margin.HELD, hold.segment, hold.leaves) for hold in self.holds),
+            *(_event(Margin.INTERIOR, i, names[k]) for i, k, _ in self.interior),
+            *(_event(Margin.EXIT, i, exit_) for i, exit_ in enumerate(self.exits)),
+            *(_event(Margin.JOINT, i, names[k]) for i, k, *_ in self.joint),
+            *(_event(Margin.ENTRY, i, names[k]) for i, k, *_ in self.entries),
+            *(_event(Margin.LASTING, i, surface) for i, surface in self.lasting),
+            *(_event(Margin.HELD, hold.segment, hold.leaves) for hold in self.holds),
         )
 
     @property

@@ -61,9 +61,20 @@ def _by_modes(model: Model, modes: tuple[str, ...], resets: tuple[str, ...]) -> 
             return still
     for surface in resets:
         still = _kept(still, _jumps(model, surface))
-    places = np.hstack([_along(model, mode)[1] for mode in modes])
-    own, sizes, _ = np.linalg.svd(still @ places, full_matrices=False)
-    return np.ascontiguousarray(own[:, : int(np.sum(sizes > _ZERO))].T @ still)
+    if not len(still):
+        return still
+    first, *others = (_along(model, mode)[1] for mode in modes)
+    varied, fixed = _varied(still, first)
+    if any(np.linalg.norm(fixed @ apart) > _ZERO for apart in others):  # few modes have others
+        return _varied(still, np.hstack([first, *others]))[0]
+    return varied
+
+
+def _varied(still: FloatArray, apart: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return those of some directions, orthonormal rows, along which states differ, and the others."""
+    own, sizes, _ = np.linalg.svd(still @ apart, full_matrices=apart.shape[1] < len(still))
+    count = int(np.sum(sizes > _ZERO))
+    return np.ascontiguousarray(own[:, :count].T @ still), own[:, count:].T @ still
 
 
 def kept_by(closure: FloatArray, directions: FloatArray) -> FloatArray:
@@ -77,8 +88,11 @@ def kept_by(closure: FloatArray, directions: FloatArray) -> FloatArray:
 
 def _kept(still: FloatArray, changes: FloatArray) -> FloatArray:
     """Return those of some directions, orthonormal rows, along which no change has a part."""
+    parts = still @ changes
+    if np.linalg.norm(parts) <= _ZERO:  # mostly: modes say what others have said
+        return still
     # all directions, and of many changes not all of theirs
-    left, sizes, _ = np.linalg.svd(still @ changes, full_matrices=changes.shape[1] < len(still))
+    left, sizes, _ = np.linalg.svd(parts, full_matrices=changes.shape[1] < len(still))
     return np.ascontiguousarray(left[:, int(np.sum(sizes > _ZERO)) :].T @ still)
 
 

@@ -34,7 +34,7 @@ from contfric.continuation.events_of_step import end_of_holds, resolve
 from contfric.continuation.families.vertical import VerticalFamily, family_near
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.located_event import ROUGH
-from contfric.continuation.locating.sliding import nearly_reached
+from contfric.continuation.locating.sliding import met_together
 from contfric.continuation.moving_joints import move_joints
 from contfric.continuation.points import FIRST_STEP, MOST_POINTS, Point, Settings, settings_of
 from contfric.continuation.start import start_of, too_fast
@@ -309,7 +309,7 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
     along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * settings.scale
     for k in first + np.flatnonzero(short & (along < np.cos(_TURN))):
         tip = rows.point(int(k))
-        found = nearly_reached(orbit, tip, settings)
+        found = met_together(orbit, tip, settings)
         if found is None or not _has_fallen(side, orbit, int(k), found):
             continue
         # it lies within the step over which the branch turns, on either of the two ways

@@ -340,13 +340,21 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
     The ends of two holds are singular each (a hold without acceleration moves nothing), and together
     they stop Newton at the root of rounding; as does a stick that vanishes at a tangential release.
     """
+    found = met_together(orbit, tip, settings)
+    if found is None:
+        return None
+    # the parameter changes by no more than the margins do, on the way that is left; as joints may be off by
+    # more, the event counts as known roughly
+    values = dict(zip(orbit.system.tests, tip.tests.tolist(), strict=False))
+    left = max(values[test] for test in _near(orbit, tip, found.orbit)) / settings.width
+    known = min(_NEARLY_REACHED, max(_ROUGHLY, left))
+    return replace(found, bound=max(found.accuracy, known))
+
+
+def met_together(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation | None:
+    """Return the event at a point just before which several conditions fail at once."""
     here = tip.orbit(orbit, orbit.model.index_of(settings.parameter))
-    near = [
-        test
-        for test, value in zip(orbit.system.tests, tip.tests, strict=False)
-        if 0.0 <= value < _NEARLY_REACHED
-        and (value < _TOGETHER or hold_of_test(test, here) is not None)
-    ]
+    near = _near(orbit, tip, here)
     if not near:
         return None
     # a stick that has no length any more before a hold brings its stop to the limit; else a stop that
@@ -357,13 +365,17 @@ def nearly_reached(orbit: Orbit, tip: Point, settings: Settings) -> Bifurcation 
         first = orbit.system.tests[_hold_after(here, orbit.system.tests.index(first))]
     kind = kind_of_margin(orbit.system, first, here)
     group = tuple(test for test in near if kind_of_margin(orbit.system, test, here) is kind)
-    found = bifurcation_at(kind, here, tip, None, tip, settings, group)
-    # the parameter changes by no more than the margins do, on the way that is left; as joints may be off by
-    # more, the event counts as known roughly
-    values = dict(zip(orbit.system.tests, tip.tests.tolist(), strict=False))
-    left = max(values[test] for test in near) / settings.width
-    known = min(_NEARLY_REACHED, max(_ROUGHLY, left))
-    return replace(found, bound=max(found.accuracy, known))
+    return bifurcation_at(kind, here, tip, None, tip, settings, group)
+
+
+def _near(orbit: Orbit, tip: Point, here: Orbit) -> list[EventFunction]:
+    """Return the margins at a point that have nearly vanished."""
+    return [
+        test
+        for test, value in zip(orbit.system.tests, tip.tests, strict=False)
+        if 0.0 <= value < _NEARLY_REACHED
+        and (value < _TOGETHER or hold_of_test(test, here) is not None)
+    ]
 
 
 def _once(here: Orbit, group: tuple[EventFunction, ...]) -> tuple[EventFunction, ...]:

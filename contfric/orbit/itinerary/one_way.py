@@ -86,13 +86,10 @@ def _growing(
         return ()
     slopes, off, largest = [], [], 0.0
     for mode in modes:
-        samples = [
-            (still @ rate, model.view(vector).height(surface, t, y))
-            for vector, t, y, rate in sampled_states(model, mode)
-        ]
-        if not samples:
+        rates, heights = _rates_and_heights(model, mode, surface)
+        if not len(heights):
             return ()
-        changes, heights = np.array([s[0] for s in samples]), np.array([s[1] for s in samples])
+        changes = rates @ still.T
         slope = heights @ changes / (heights @ heights)
         slopes.append(slope)
         off.append(changes - np.outer(heights, slope))
@@ -102,6 +99,14 @@ def _growing(
     explained = right[int(np.sum(sizes > _ZERO * largest)) :].T
     weights = _of_one_sign(np.array(slopes) @ explained)
     return tuple(mode for mode, weight in zip(modes, weights, strict=True) if weight > _ZERO)
+
+
+@cache
+def _rates_and_heights(model: Model, mode: str, surface: str) -> tuple[FloatArray, FloatArray]:
+    """Return the rates at sampled states of a mode, and their heights over a surface."""
+    found = sampled_states(model, mode)
+    heights = [model.view(vector).height(surface, t, y) for vector, t, y, _ in found]
+    return np.array([rate for *_, rate in found]), np.array(heights)
 
 
 def _of_one_sign(columns: FloatArray) -> FloatArray:
