@@ -305,7 +305,7 @@ def is_linear(test: EventFunction, orbit: Orbit) -> bool:
     The rate at an exit does where an orbit comes to the tangency; a hold may be left anywhere.
     """
     return test.margin is not Margin.EXIT or any(
-        hold.segment == test.segment for hold in orbit.system.holds
+        hold.segment == test.segment and hold.until is None for hold in orbit.system.holds
     )
 
 

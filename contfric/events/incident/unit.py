@@ -1,8 +1,8 @@
 """The unit of a motion: its shortest period (half of it if it is its own symmetry image); its itineraries.
 
 A motion at an event solves the equations of several itineraries (:mod:`contfric.events.incident.incident`).
-It is cut at the start of a slide of some length, which every itinerary has; each itinerary of a unit is a
-**form**.
+It is cut at the start of a slide of some length, which every itinerary has, and in which no contact rests if
+there is one; each itinerary of a unit is a **form**.
 """
 
 from __future__ import annotations
@@ -141,8 +141,11 @@ def unit_of(orbit: Orbit) -> Unit:
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    lasts = orbit.durations
-    longest = max(slides, key=lambda i: lasts[i])
+    lasts, resting = (
+        orbit.durations,
+        [orbit.model.mode_by_name[m].sliding for m, _ in orbit.itinerary],
+    )
+    longest = max(slides, key=lambda i: (not resting[i], lasts[i]))
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.itinerary[longest][0]
     cut = np.array(orbit.begins[longest])
