@@ -1,7 +1,7 @@
 """Holds that last while other contacts change their states: what follows where one begins, ends, or grows.
 
-Such a hold is several in a row (``docs/bridges.md``): each but the first is pinned to the surface that another
-contact meets where it begins, and each but the last ends there.
+Such a hold is several in a row (``docs/bridges.md``): each but the first is pinned to the surface that
+another contact meets where it begins, and each but the last ends there.
 
 =========================================  =============================================================
 event                                      edit of the itinerary
