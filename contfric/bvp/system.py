@@ -147,6 +147,13 @@ class System:
         closing[1:, 1:] = self.layout.closing
         return closing
 
+    @cached_property
+    def ends_of_holds(self) -> tuple[tuple[Hold, Hold], ...]:
+        """The first and the last part of each hold: the same unless it goes on in other modes."""
+        first = [hold for hold in self.holds if not hold.follows]
+        last = [hold for hold in self.holds if hold.until is None]
+        return tuple(zip(first, last, strict=True))
+
     def functions(self) -> int:
         """Return the model's compiled functions as kernels take them."""
         return self.model.flow.functions()

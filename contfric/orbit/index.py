@@ -158,10 +158,8 @@ def _pins(system: System, a: FloatArray, b: FloatArray) -> dict[int, _Pin]:
     its first part, and one length, of its last; the others end at the surfaces that other contacts meet.
     """
     model, pins = system.model, {}
-    first = [hold for hold in system.holds if not hold.follows]
-    last = [hold.segment for hold in system.holds if hold.until is None]
-    for number, (hold, end) in enumerate(zip(first, last, strict=True)):
-        h, mode = hold.segment, system.itinerary[hold.segment][0]
+    for number, (hold, last) in enumerate(system.ends_of_holds):
+        h, mode, end = hold.segment, system.itinerary[hold.segment][0], last.segment
         if hold.pin is not None:
             sign = inside_sign(model, mode, hold.pin)
             pins[end] = _Pin(number, h, sign * a[:, h, -1:], np.zeros_like(a[:, h, -1:]))

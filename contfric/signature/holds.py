@@ -339,7 +339,7 @@ def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
         return f"'{hold}' must stand between two domains"
     if len(around) > 3:
         if _long_hold(model, around) is None:
-            return f"no hold leads from {around[0]} to {after} by {', '.join(around[1:-1])}"
+            return f"'{hold}' must stand between two domains, or go on with a hold as another contact changes"
         return None
     surface = surface_into(model, segments, (index - 1) % len(segments))
     if surface is None:
