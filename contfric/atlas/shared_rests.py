@@ -98,7 +98,7 @@ def _orbits_at(branches: Iterable[Branch], value: float) -> list[Orbit]:
 def _hold_starts(orbit: Orbit) -> list[FloatArray]:
     """Return time and state at the start of each hold of an orbit, and those of its symmetry image."""
     symmetry, half = orbit.model.symmetry, 0.5 * orbit.period / orbit.periods
-    found = [orbit.begins[hold.segment] for hold in orbit.system.holds]
+    found = [orbit.begins[first.segment] for first, _ in orbit.system.ends_of_holds]
     if symmetry is not None:
         found += [np.array([p[0] + half, *(symmetry.array() @ p[1:])]) for p in found]
     return found

@@ -63,9 +63,9 @@ class Assembly:
 
     @cached_property
     def exits(self) -> list[str]:
-        """The exit surface of each segment; of a hold the one that it leaves."""
+        """The exit surface of each segment; of a hold the one that it leaves, if it is left at its end."""
         return [
-            self.held[i].leaves if i in self.held else exit_
+            (self.held[i].until or self.held[i].leaves) if i in self.held else exit_
             for i, (_, exit_) in enumerate(self.itinerary)
         ]
 
@@ -88,7 +88,7 @@ class Assembly:
         """
         found = following_modes(self.model, self.itinerary, self.half)
         for hold in self.holds:
-            if hold.segment > 0 and (hold.after_rest or hold.pin is not None):
+            if not hold.follows and (hold.after_rest or hold.pin is not None):
                 found[hold.segment - 1] = hold.departs
         return found
 
@@ -130,6 +130,8 @@ class Assembly:
     def exit_sign(self, i: int) -> float:
         """Return the sign of the rate of the observable where the exit surface is met from inside."""
         domain, hold = self.inside[i][0], self.held.get(i)
+        if hold is not None and hold.until is not None:
+            return float(-inside_sign(self.model, self.itinerary[i][0], hold.until))
         if hold is not None:  # it is left to the side on which the departing mode lies
             domain = mode_domains(self.model, hold.departs)[0]
         elif i + 1 in self.held and self.held[i + 1].pin is None:
@@ -188,6 +190,20 @@ class Assembly:
             *(_event(Margin.LASTING, i, surface) for i, surface in self.lasting),
             *(_event(Margin.HELD, hold.segment, hold.leaves) for hold in self.holds),
         )
+
+    @cached_property
+    def leaving(self) -> list[tuple[int, int, int, int]]:
+        """Rows (segment, surface, side, mode) of the holds: what each leaves, to where, and in which mode."""
+        model = self.model
+        return [
+            (
+                hold.segment,
+                model.surface_index[hold.leaves],
+                int(model.domain_by_name[mode_domains(model, hold.departs)[0]].signs[hold.leaves]),
+                model.mode_index[hold.departs],
+            )
+            for hold in self.holds
+        ]
 
     @property
     def doubles(self) -> list[tuple[int, ...]]:

@@ -50,7 +50,7 @@ LayoutType = types.NamedTuple(
         indices,
         indices,
         indices,
-        indices,
+        table,
         table,
         matrix,
         matrix,

@@ -36,13 +36,18 @@ def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tupl
     A hold after a touch of its limit, and the stick up to that touch: where it shrinks to nothing, the
     margin of the stop before it has a double zero. And the slide from one hold to the touch at which the
     next begins: where it shrinks to nothing, the acceleration with which the first is left has one.
+    Of a hold in several modes the last part: it is left where another contact has just changed its state.
     """
     found: list[tuple[int, str]] = []
     left = _slides(itinerary, holds)
     for hold in holds:
         before = (hold.segment - 1) % len(itinerary)
-        if hold.after_rest:
-            found += [(before, itinerary[before][1]), (hold.segment, hold.leaves)]
+        if hold.follows:
+            found += [(hold.segment, hold.leaves)] if hold.until is None else []
+        elif hold.after_rest:
+            found.append((before, itinerary[before][1]))
+            if hold.until is None:  # else the other contact meets its surface at the touch
+                found.append((hold.segment, hold.leaves))
         elif hold.pin is None and before in left:
             found.append((before, itinerary[before][1]))
     return found
@@ -50,7 +55,7 @@ def lasting_segments(itinerary: Itinerary, holds: tuple[Hold, ...]) -> list[tupl
 
 def _slides(itinerary: Itinerary, holds: tuple[Hold, ...]) -> dict[int, Hold]:
     """Return the slides from a hold to where the same contact comes to rest, each with that hold."""
-    found = {(hold.segment + 1) % len(itinerary): hold for hold in holds}
+    found = {(hold.segment + 1) % len(itinerary): hold for hold in holds if hold.until is None}
     return {i: hold for i, hold in found.items() if itinerary[i][1] == hold.leaves}
 
 

@@ -195,14 +195,20 @@ def lasting_margin(layout, k, z, workspace):  # type: ignore[no-untyped-def]
 
 @helper
 def held_margin(functions, layout, k, z, p, workspace, stationary):  # type: ignore[no-untyped-def]
-    """Return the least acceleration with which hold k could be left where an observable is stationary."""
-    i = layout.held[k]
-    left = layout.observables[layout.exits[i]]
+    """Return the least acceleration with which hold k could be left where an observable is stationary.
+
+    And at its end if it goes on there in another mode: the acceleration may have a corner at such a change.
+    """
+    i = layout.held[k, 0]
+    left, sign = layout.observables[layout.held[k, 1]], layout.held[k, 2]
     after = z[i + 1] if i + 1 < z.shape[0] else workspace.last
     duration = after[0] - z[i, 0]
     first = _AT_PIN * (1.0 + duration)
     state, least = workspace.state, np.inf
     watched = -1
+    none, empty = workspace.none, workspace.empty
+    if layout.departs[i] != layout.held[k, 3]:
+        least = sign * functions.rate(layout.held[k, 3], left, after[0], after[1:], p, none, empty)
     for row in range(layout.interior.shape[0]):
         c = layout.observables[layout.interior[row, 1]]
         if layout.interior[row, 0] != i or c == watched:
@@ -219,14 +225,12 @@ def held_margin(functions, layout, k, z, p, workspace, stationary):  # type: ign
                 z[i, 1:],
                 time,
                 p,
-                workspace.none,
+                none,
                 state,
                 workspace.nothing,
             )
-            rate = functions.rate(
-                layout.departs[i], left, z[i, 0] + time, state, p, workspace.none, workspace.empty
-            )
-            least = min(least, layout.exit_signs[i] * rate)
+            rate = functions.rate(layout.held[k, 3], left, z[i, 0] + time, state, p, none, empty)
+            least = min(least, sign * rate)
     return least
 
 

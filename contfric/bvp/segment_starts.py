@@ -38,7 +38,7 @@ def beginnings(
     departs, resets, returns = (np.full(len(itinerary), empty) for empty in (-1, -1, 0))
     for i, row in enumerate(zip(modes, before, exits, entered, strict=True)):
         if i in held:
-            departs[i] = model.mode_index[held[i].departs]
+            departs[i] = model.mode_index[held[i].departs if held[i].until is None else modes[i]]
             continue
         returns[i] = _returns(model, *row)
         if model.reset_at(row[1], row[3]) is not None:

@@ -13,9 +13,10 @@ Crossings of transparent surfaces inside a segment do not matter to the solution
 
 A hold (:mod:`contfric.bvp.holds`) has a pin at its start in the place of the exit surface. Its exit
 margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
-one that follows a stick must last, and so must that stick, whose end is tangential, and a slide that leads
-from one hold to the touch of another (LASTING). Where such a segment shrinks to nothing, other margins have a
-double zero: they are divided by the square of its duration, for what is left of them is their sign.
+one that follows a stick must last, and so must that stick, whose end is tangential, a slide that leads from
+one hold to the touch of another, and the last part of a hold in several modes (LASTING). Where such a segment
+shrinks to nothing, other margins may have a double zero: they are divided by the square of its duration, for
+what is left of them is their sign.
 
 Everything here derives from the model's definition; nothing knows what moves.
 """
@@ -62,13 +63,15 @@ class Layout(NamedTuple):
         margins, at its beginning (1)
     labels : rows (segment, observable, surfaces that the segment starts and ends on, or -1)
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
-    departs : mode in which each hold is left, shape (N,); -1 where there is no hold
+    departs : mode in which each hold is left, or its own if it goes on in another one, shape (N,); -1 where
+        there is no hold
     resets : surface of the reset that each segment begins behind, shape (N,); -1 without one
     returns : 1 for segments that begin on their exit surface, so that they may shrink to nothing, shape (N,);
         0 for the last where all do
     lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at
         which another begins, shape (k,)
-    held : all holds, which could be left at any time, shape (k,)
+    held : rows (segment, surface, side, mode) of all holds, which could be left at any time: the surface that
+        is left, to which side, and in which mode
     doubles : rows (margin, segment): the margin has a double zero where the segment has no length
     closure : state matrix of the closure, shape (n, n)
     closing : the same for corrections, which leave alone what the itinerary conserves, shape (n, n)
@@ -131,6 +134,13 @@ class System:
         closing[1:, 1:] = self.layout.closing
         return closing
 
+    @cached_property
+    def ends_of_holds(self) -> tuple[tuple[Hold, Hold], ...]:
+        """The first and the last part of each hold: the same unless it goes on in other modes."""
+        first = [hold for hold in self.holds if not hold.follows]
+        last = [hold for hold in self.holds if hold.until is None]
+        return tuple(zip(first, last, strict=True))
+
     def functions(self) -> int:
         """Return the model's compiled functions as kernels take them."""
         return self.model.flow.functions()
@@ -177,7 +187,7 @@ def build_system(
         pins=_whole(made.pin(i) for i in range(count)),
         **beginnings(model, itinerary, made.exits, made.joints, made.held),
         lasting=_whole(i for i, _ in made.lasting),
-        held=_whole(made.held),
+        held=_rows(made.leaving, 4),
         doubles=_rows(made.doubles, 2),
         closure=closure,
         closing=closure + datum.T @ datum,

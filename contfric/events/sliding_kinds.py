@@ -22,6 +22,7 @@ joint      the state at a stop meets a surface     CS if it leaves the stick the
 entry      after a reset the state is on another  CS: another mode follows; GS where what just passes or
            surface                                 turns back is mapped again
 lasting    slide between two holds                 GS: the first can be left no more
+lasting    last part of a hold in several modes    CS: it is left as another contact changes
 any        of a segment that vanishes between two  as the exit by which it begins: AS of a slip, GS of a
            of one mode (:func:`beginning_of`)      stick
 =========  ======================================  ==========================================
@@ -52,7 +53,7 @@ from contfric.events.local.touching import (
 from contfric.models.definition import Domain, Model
 from contfric.models.mode_domains import inside_sign
 from contfric.orbit.orbit import Orbit
-from contfric.signature.holds import ends_rest
+from contfric.signature.holds import ends_rest, of_another
 
 #: A segment that is this short (in periods) has vanished where one of its margins has: they are its length
 #: times a rate, and Newton may fail before they are below 1e-5.
@@ -73,7 +74,7 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     model, mode = system.model, system.itinerary[test.segment][0]
     hold = hold_of_test(test, orbit)
     if hold is not None:
-        return kind_of_hold(hold, test)
+        return kind_of_hold(hold, test, orbit)
     if chosen_at(system, test):
         return Kind.SS
     if test.margin is Margin.ENTRY:
@@ -123,6 +124,8 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
     for hold in orbit.system.holds:
         if test.segment == hold.segment:
             return hold
+        if hold.until is not None:
+            continue
         behind = (hold.segment + 1) % len(orbit.system.itinerary)
         if test.segment == behind and test.margin is not Margin.JOINT:
             duration = orbit.durations[behind]
@@ -131,17 +134,29 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
     return None
 
 
-def kind_of_hold(hold: Hold, test: EventFunction) -> Kind:
+def kind_of_hold(hold: Hold, test: EventFunction, orbit: Orbit) -> Kind:
     """Return the event that an end of a hold's freedom is: that which the hold is pinned to.
 
-    Unless it touches its limit on the way (AS), or can just not be left there (GS).
+    Unless it touches its limit on the way (AS), or can just not be left there (GS). Where another contact
+    changes its state as the hold ends it is CS; where that contact's surface is touched, as in other rests.
     """
+    model, mode = orbit.model, orbit.system.itinerary[hold.segment][0]
+    if test.segment == hold.segment and test.margin is not Margin.HELD:
+        short = bool(orbit.durations[hold.segment] < _VANISHED * orbit.period)
+        met = test.surface != hold.leaves and of_another(model, mode, test.surface, hold.leaves)
+        if (met and test.margin is Margin.JOINT) or (short and hold.follows and hold.until is None):
+            return Kind.CS
+        if met:
+            return _kind_of_touch(model, mode, test.surface)
     if test.margin is Margin.INTERIOR and test.segment == hold.segment:
         return Kind.AS
     if test.margin is Margin.HELD:
         return Kind.GS
     if test.margin is Margin.LASTING and test.segment != hold.segment:
         return Kind.GS  # the slide after it has vanished
+    holds = orbit.system.holds
+    while hold.follows:
+        hold = holds[holds.index(hold) - 1]
     if hold.pin is not None:
         return Kind.SS
     return Kind.AS if hold.after_rest else Kind.GS

@@ -155,21 +155,24 @@ def _pins(system: System, a: FloatArray, b: FloatArray) -> dict[int, _Pin]:
     """Return the pins by the segments of their holds; in the blocks each hold gets its length as last row.
 
     After a touch the exit of the segment before the hold and the pin change places: the touch is where the
-    rate vanishes, and the pin is the distance from the surface there.
+    rate vanishes, and the pin is the distance from the surface there. A hold in several modes has one pin, of
+    its first part, and one length, of its last; the others end at the surfaces that other contacts meet.
     """
     model, pins = system.model, {}
-    for number, hold in enumerate(system.holds):
-        h, mode = hold.segment, system.itinerary[hold.segment][0]
+    for number, (hold, last) in enumerate(system.ends_of_holds):
+        h, mode, end = hold.segment, system.itinerary[hold.segment][0], last.segment
         if hold.pin is not None:
             sign = inside_sign(model, mode, hold.pin)
-            pins[h] = _Pin(number, h, sign * a[:, h, -1:], np.zeros_like(a[:, h, -1:]))
+            pins[end] = _Pin(number, h, sign * a[:, h, -1:], np.zeros_like(a[:, h, -1:]))
         else:
             before, exit_ = system.itinerary[h - 1]
             sign = inside_sign(model, before, exit_) * (1 if hold.after_rest else -1)
-            pins[h] = _Pin(number, h - 1, sign * a[:, h - 1, -1:], sign * b[:, h - 1, -1:])
+            pins[end] = _Pin(number, h - 1, sign * a[:, h - 1, -1:], sign * b[:, h - 1, -1:])
             a[:, h - 1, -1], b[:, h - 1, -1] = 0.0, a[:, h, -1]
-        a[:, h, -1], b[:, h, -1] = 0.0, 0.0
-        a[:, h, -1, 0], b[:, h, -1, 0] = -1.0, 1.0
+        for k in range(h, end):
+            a[:, k, -1], b[:, k, -1] = 0.0, a[:, k + 1, -1]
+        a[:, end, -1], b[:, end, -1] = 0.0, 0.0
+        a[:, end, -1, 0], b[:, end, -1, 0] = -1.0, 1.0
     return pins
 
 

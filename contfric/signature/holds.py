@@ -12,6 +12,10 @@ parameter. See ``docs/bridges.md``.
     follows a segment that ends tangentially: a slide that touches rest (GS), or a stick that touches its
     limit (AS).
 
+Where another contact changes its state meanwhile, a hold goes through several modes. It is written as one
+hold for each: ``hold@low+`` after another hold begins where the other contact meets its surface ``low+``, and
+is left as the first one would be.
+
 In a reduced itinerary a hold is the pair (sliding mode, ``hold@...``).
 """
 
@@ -60,9 +64,16 @@ def mirror_exit(name: str, surfaces: Mapping[str, str]) -> str:
     return TOUCH if surface is None else hold_at(surfaces[surface])
 
 
-def known_hold(name: str, model: Model) -> bool:
-    """Return whether a hold is one of a model: pinned to a surface that bounds its rest, or a touch."""
+def known_hold(name: str, model: Model, follows: bool = False) -> bool:
+    """Return whether a hold is one of a model: pinned to a surface that bounds its rest, or a touch.
+
+    Parameters
+    ----------
+    follows : whether it goes on with one in another mode; it then begins on a surface of another contact
+    """
     surface = pinned_surface(name)
+    if follows:
+        return surface is not None and surface in model.surface_by_name
     if model.composed:
         return surface is None or (surface in model.surface_by_name and not model.rests_on(surface))
     return surface is None or any(
@@ -112,6 +123,12 @@ def _rested_on(model: Model, mode: str) -> list[str]:
     return [s for s, sign in first.signs.items() if sign == 0 and model.lies_on(mode, s)]
 
 
+def of_another(model: Model, mode: str, surface: str, leaves: str) -> bool:
+    """Tell whether a surface that a rest meets is another contact's: what would leave its own rests on."""
+    released = release_mode(model, mode, surface)
+    return released is None or model.lies_on(released, leaves)
+
+
 def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
     """Return the mode in which a hold is left, from the segment before it.
 
@@ -142,10 +159,109 @@ def departing_mode(model: Model, before: Pair, hold: Pair) -> str:
     return found
 
 
+@cache
+def departing_on(model: Model, departs: str, leaves: str, mode: str) -> str:
+    """Return the mode in which a hold is left that goes on in a mode of rest after another contact changed.
+
+    It leaves the same surface, to the side on which the mode ``departs`` of the hold so far lies.
+
+    Raises
+    ------
+    NotationError
+        If it cannot be left there: the contact rests no more, or in a way that leads elsewhere.
+
+    Examples
+    --------
+    >>> from contfric.models import load_model
+    >>> departing_on(load_model("braced-chain"), "spn", "middle", "psn")
+    'ppn'
+    """
+    side = next(iter(model.domains_of(departs))).signs.get(leaves)
+    others = [s for s in _rested_on(model, mode) if s != leaves]
+    for domain in model.domains_of(mode) if model.lies_on(mode, leaves) else ():
+        for _, target in model.exits_of(domain.name):
+            after = model.domain_by_name[target]
+            if after.signs.get(leaves) == side and _rested_on(model, after.mode) == others:
+                return after.mode
+    raise NotationError(
+        f"'{mode}' of model '{model.name}' is not left as '{departs}' leaves {leaves}"
+    )
+
+
+def following_rests(model: Model, mode: str, surface: str, leaves: str) -> list[str]:
+    """Return the modes through a surface of another contact in which a contact at rest rests on."""
+    targets = [t for d in model.domains_of(mode) for t in model.targets.get((d.name, surface), ())]
+    modes = dict.fromkeys(model.domain_by_name[t].mode for t in targets)
+    return [m for m in modes if m != mode and model.lies_on(m, leaves)]
+
+
+@cache
+def _long_hold(model: Model, segments: tuple[str, ...]) -> tuple[str, tuple[str, ...]] | None:
+    """Return the mode that a hold in several modes would be left to at first, and those that it goes through.
+
+    Parameters
+    ----------
+    segments : the domain before it, its holds, and the domain after it
+
+    Returns
+    -------
+    None if no such hold leads from the one to the other.
+    """
+    before, first, *further = segments[:-1]
+    source = model.domain_by_name[before].mode
+    wanted = model.domain_by_name[segments[-1]].mode
+    held = len(_rested_on(model, source))
+    domains = [before, *(d.name for d in model.domains_of(source))]
+    exits = [pair for domain in domains for pair in model.exits_of(domain)]
+    rests = [
+        m for _, t in exits if len(_rested_on(model, m := model.domain_by_name[t].mode)) > held
+    ]
+    ways: list[tuple[str, str | None]] = [
+        (source, release_mode(model, source, s)) for s, _ in exits
+    ]
+    if first != TOUCH:
+        ways = [(rest, release_mode(model, rest, str(pinned_surface(first)))) for rest in rests]
+    else:
+        ways = [(rest, source) for rest in rests] + ways
+    for rest, departs in dict.fromkeys(ways):
+        if departs is None or not model.mode_by_name[rest].sliding:
+            continue
+        leaves, chains = left_surface(model, rest, departs), [((rest,), departs)]
+        if model.lies_on(departs, leaves):
+            continue
+        for hold in further:
+            chains = [
+                ((*modes, on), departing_on(model, left, leaves, on))
+                for modes, left in chains
+                for on in following_rests(model, modes[-1], str(pinned_surface(hold)), leaves)
+            ]
+        for modes, left in chains:
+            if left == wanted:
+                return departs, modes
+    return None
+
+
+def _around(segments: Sequence[str], index: int) -> tuple[tuple[str, ...], int]:
+    """Return the holds that follow one another about one, with the segments around, and its place there."""
+    first, last = index, index
+    while is_hold(segments[first - 1]) and last - first < len(segments):
+        first -= 1
+    while is_hold(segments[(last + 1) % len(segments)]) and last - first < len(segments):
+        last += 1
+    found = tuple(segments[k % len(segments)] for k in range(first - 1, last + 2))
+    return found, index - first
+
+
 def mode_of(model: Model, segments: Sequence[str], index: int) -> str:
     """Return the mode of a segment of a walk; that of a hold is the rest that it starts from."""
     if not is_hold(segments[index]):
         return model.domain_by_name[segments[index]].mode
+    around, place = _around(segments, index)
+    if len(around) > 3:
+        found = _long_hold(model, around)
+        if found is None:
+            raise NotationError(f"no hold leads from {around[0]} to {around[-1]} by {around[1:-1]}")
+        return found[1][place]
     before = model.domain_by_name[segments[index - 1]].mode
     after = model.domain_by_name.get(segments[(index + 1) % len(segments)])
     released = segments[index] == TOUCH and (after is None or after.mode != before)
@@ -174,8 +290,10 @@ def surface_into(model: Model, segments: Sequence[str], index: int) -> str | Non
     where it would reverse; a stick touches the surface that releases it the way the hold goes.
     """
     source, hold = segments[index], (index + 1) % len(segments)
-    beyond = model.domain_by_name[segments[(index + 2) % len(segments)]].mode
+    around, _ = _around(segments, hold)
     rest = mode_of(model, segments, hold)
+    found = _long_hold(model, around) if len(around) > 3 else None
+    beyond = found[0] if found is not None else model.domain_by_name[around[-1]].mode
     touches = segments[hold] == TOUCH and rest != model.domain_by_name[source].mode
     wanted = rest if touches else beyond
     for surface, target in model.exits_of(source):
@@ -211,16 +329,18 @@ def hold_fault(model: Model, segments: Sequence[str], index: int) -> str | None:
     >>> hold_fault(load_model("coulomb"), ("x+v+", "hold@F+", "x+v-"), 1)
     "'hold@F+' leads to x0v-, not to x+v-"
     """
-    hold, before, after = (
-        segments[index],
-        segments[index - 1],
-        segments[(index + 1) % len(segments)],
-    )
-    if not known_hold(hold, model):
+    hold, before = segments[index], segments[index - 1]
+    around, place = _around(segments, index)
+    after = around[-1]
+    if not known_hold(hold, model, follows=place > 0):
         valid = ", ".join([TOUCH, *(hold_at(s) for s in model.surface_by_name)])
         return f"model '{model.name}' has no '{hold}'; a hold is one of {valid}"
-    if is_hold(before) or is_hold(after) or before not in model.domain_by_name:
+    if not {around[0], after} <= model.domain_by_name.keys():
         return f"'{hold}' must stand between two domains"
+    if len(around) > 3:
+        if _long_hold(model, around) is None:
+            return f"'{hold}' must stand between two domains, or go on with a hold as another contact changes"
+        return None
     surface = surface_into(model, segments, (index - 1) % len(segments))
     if surface is None:
         return f"no '{hold}' can follow {before}"
@@ -249,13 +369,22 @@ def without_holds(itinerary: tuple[Pair, ...], model: Model) -> tuple[Pair, ...]
     (('slide+', 'v'), ('stick', 'F+'), ('slide-', 'v'), ('stick', 'F-'))
     """
     found: list[Pair] = []
+    departs = leaves = ""  # of the hold before
+    first = next((k for k, (_, exit_) in enumerate(itinerary) if not is_hold(exit_)), 0)
+    itinerary = itinerary[first:] + itinerary[:first]
     for index, pair in enumerate(itinerary):
         before = itinerary[index - 1]
         if not is_hold(pair[1]):
             found.append(pair)
-        elif not ends_rest(model, *before):
-            wanted = departing_mode(model, before, pair)
-            found.append((pair[0], _surface_towards(model, pair[0], wanted)))
+        elif is_hold(before[1]):  # up to where it begins what is held is a stick
+            departs = departing_on(model, departs, leaves, pair[0])
+            found[-1] = found[-1][0], str(pinned_surface(pair[1]))
+            found.append((pair[0], _surface_towards(model, pair[0], departs)))
+        else:
+            departs = departing_mode(model, before, pair)
+            leaves = left_surface(model, pair[0], departs)
+            if not ends_rest(model, *before):
+                found.append((pair[0], _surface_towards(model, pair[0], departs)))
     return tuple(found)
 
 

@@ -141,8 +141,11 @@ class Signature(Shown):
 
     @property
     def holds(self) -> int:
-        """Number of holds; an orbit with one lies on a bridge."""
-        return sum(is_hold(segment) for segment in self.segments)
+        """Number of holds; an orbit with one lies on a bridge. One that goes on in other modes is one."""
+        return sum(
+            is_hold(segment) and not is_hold(self.segments[k - 1])
+            for k, segment in enumerate(self.segments)
+        )
 
     @property
     def impacts(self) -> int:
@@ -205,7 +208,8 @@ class Signature(Shown):
             Whether the orbit is symmetric; the segments alone do not tell.
         """
         name = f"{self.stops}{'s' if symmetric else 'a'}"
-        count = len(self.segments) - self.holds - self.impacts - self.resets
+        held = sum(map(is_hold, self.segments))
+        count = len(self.segments) - held - self.impacts - self.resets
         name = name if count == TYPICAL_SEGMENTS else f"{name}, {count}seg"
         name = f"{name}, {self.impacts}imp" if self.impacts else name
         name = f"{name}, {self.resets}reset" if self.resets else name

@@ -41,11 +41,12 @@ _OTHER_SIDE = 0.5
 
 def passages(system: System) -> list[list[int]]:
     """Return the joints that follow from each hold: from its end to the start of the next one."""
-    count, starts = len(system.itinerary), [hold.segment for hold in system.holds]
+    count, holds = len(system.itinerary), system.ends_of_holds
+    starts = [first.segment for first, _ in holds]
     ahead = [*starts[1:], starts[0] + count] if starts else []
     return [
-        [j % count for j in range(start + 1, after + 1)]
-        for start, after in zip(starts, ahead, strict=True)
+        [j % count for j in range(last.segment + 1, after + 1)]
+        for (_, last), after in zip(holds, ahead, strict=True)
     ]
 
 
@@ -126,7 +127,7 @@ class Arms:
         assert self.shorter is not None
         orbit = self._repeated(self.longer, len(sequence))
         other = self._repeated(self.shorter, len(sequence)).joints
-        joints, own = orbit.joints.copy(), len(self.fold.system.holds)
+        joints, own = orbit.joints.copy(), len(self.fold.system.ends_of_holds)
         short = list(self.turning)
         for number, locations in enumerate(passages(orbit.system)):
             unit, hold = divmod(number, own)
@@ -157,7 +158,7 @@ def arms_at(orbit: Orbit) -> Arms | None:
         fold = form.orbit
     except (NotationError, ValueError):
         return None
-    if len(fold.system.holds) * len(parts) != len(whole.system.holds):
+    if len(fold.system.ends_of_holds) * len(parts) != len(whole.system.ends_of_holds):
         return None
     if turning := turning_passages(fold):
         return Arms(unit, fold, turning)

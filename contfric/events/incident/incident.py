@@ -31,7 +31,7 @@ from contfric.bvp.system import EventFunction, Itinerary, Margin, build_system
 from contfric.errors import NotationError
 from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
 from contfric.events.incident.unit import Form, Unit, form_of, pieces, unit_of
-from contfric.events.locations import TANGENTIAL, locations_of, normal_location
+from contfric.events.locations import TANGENTIAL, locations_of, normal_location, rests_at
 from contfric.events.outcomes.outcomes import (
     NO_LENGTH_AT_TOUCH,
     RestsForEver,
@@ -128,17 +128,19 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     orbit = bifurcation.orbit.as_whole()
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
     least = max(least, _missed(bifurcation)) if least == _NEARLY else least
-    unit = unit_of(orbit)
+    locations = locations_of(bifurcation)
+    rests = rests_at(orbit, locations)
+    unit = unit_of(orbit, rests)
     if not _moves(orbit):
         return Incident(
             unit, (), (Refusal("what moves", "nothing moves any more", True),), (), least
         )
     cut = divided(orbit, orbit.periods // bifurcation.outline.periods)
-    collection, arrives = _started(cut or orbit, unit_of(cut) if cut else unit, least)
+    collection, arrives = _started(cut or orbit, unit_of(cut, rests) if cut else unit, least)
     unit = collection.unit
     if cut is None:
-        locations = [(location, bifurcation.kind) for location in locations_of(bifurcation)]
-        collection.edit(orbit, arrives, np.zeros(len(orbit.itinerary)), "", locations)
+        kinds = [(location, bifurcation.kind) for location in locations]
+        collection.edit(orbit, arrives, np.zeros(len(orbit.itinerary)), "", kinds)
     collection.close()
     return Incident(
         unit,
@@ -305,7 +307,7 @@ def is_linear(test: EventFunction, orbit: Orbit) -> bool:
     The rate at an exit does where an orbit comes to the tangency; a hold may be left anywhere.
     """
     return test.margin is not Margin.EXIT or any(
-        hold.segment == test.segment for hold in orbit.system.holds
+        hold.segment == test.segment and hold.until is None for hold in orbit.system.holds
     )
 
 

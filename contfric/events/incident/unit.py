@@ -1,12 +1,13 @@
 """The unit of a motion: its shortest period (half of it if it is its own symmetry image); its itineraries.
 
 A motion at an event solves the equations of several itineraries (:mod:`contfric.events.incident.incident`).
-It is cut at the start of a slide of some length, which every itinerary has; each itinerary of a unit is a
-**form**.
+It is cut at the start of a slide of some length, which every itinerary has, and in which no contact rests if
+there is one; each itinerary of a unit is a **form**.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,8 @@ from contfric.orbit.canonical.slides import (
 from contfric.orbit.clock import clocked
 from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
+from contfric.signature.edits import is_closed_walk, show
+from contfric.signature.holds import is_hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,7 @@ class Form:
     @property
     def has_hold(self) -> bool:
         """Whether something is held."""
-        return any(exit_.startswith("hold@") for _, exit_ in self.itinerary)
+        return any(is_hold(exit_) for _, exit_ in self.itinerary)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +131,9 @@ class Unit:
         away = np.concatenate([f.away for f in forms])
         half = self.half and count % 2 == 1
         periods = self.periods * count // (2 if self.half and not half else 1)
+        whole = itinerary if not half else (*itinerary, *mirror_pairs(self.model, itinerary))
+        if any(is_hold(exit_) for _, exit_ in whole) and not is_closed_walk(whole, self.model):
+            raise NotationError(f"'{show(whole)}' is no closed walk: a hold would be cut in two")
         joints = clocked(self.model, joints, float(joints[0, 0]) + count * self.duration)
         try:
             system = build_system(self.model, itinerary, periods, half)
@@ -136,14 +142,23 @@ class Unit:
         return Orbit(system, joints, self.vector.copy(), 0.0, Status.CONVERGED), away
 
 
-def unit_of(orbit: Orbit) -> Unit:
-    """Return the unit of the solution of a whole orbit."""
+def unit_of(orbit: Orbit, rests: Collection[str] = ()) -> Unit:
+    """Return the unit of the solution of a whole orbit.
+
+    Parameters
+    ----------
+    rests : surfaces of contacts that may be held; it is cut where they do not rest, if there is such a slide
+    """
     slides = slides_of(orbit)
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    lasts = orbit.durations
-    longest = max(slides, key=lambda i: lasts[i])
+    lasts, resting = (
+        orbit.durations,
+        [orbit.model.mode_by_name[m].sliding for m, _ in orbit.itinerary],
+    )
+    held = [any(orbit.model.lies_on(mode, s) for s in rests) for mode, _ in orbit.itinerary]
+    longest = max(slides, key=lambda i: (not held[i], not resting[i], lasts[i]))
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.itinerary[longest][0]
     cut = np.array(orbit.begins[longest])

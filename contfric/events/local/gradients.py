@@ -46,7 +46,8 @@ def gradient_of(
     if location.margin is Margin.JOINT:
         gradient[i + 1], slope = surface_gradient(orbit, location.surface, orbit.ends[i], active)
     elif location.margin is Margin.EXIT:
-        mode = held.departs if held is not None else orbit.itinerary[i][0]
+        ends = held is not None and held.until is None
+        mode = held.departs if held is not None and ends else orbit.itinerary[i][0]
         gradient[i + 1], slope = _rate_gradient(
             orbit, mode, location.surface, orbit.ends[i], active
         )

@@ -119,7 +119,8 @@ def touch_of(orbit: Orbit, i: int, surface: str | None) -> FloatArray:
     """
     model = orbit.model
     if surface is None:
-        departs = orbit.itinerary[(i + 1) % len(orbit.itinerary)][0]
+        own = i % orbit.system.segments
+        departs = next(hold.departs for hold in orbit.system.holds if hold.segment == own)
         rate = _departure_rate(orbit, i, departs)
         still = _stationary(orbit, i)
         if not still:

@@ -27,7 +27,8 @@ a hold can just not be left inside     split it there: a slide and a second hold
 =====================================  ========================================================
 
 Where a stick becomes a hold, the hold lasts to the release, unless before that it cannot be left any
-more: there it ends, with a slide of length zero, and the rest of the stick follows.
+more: there it ends, with a slide of length zero, and the rest of the stick follows. Other contacts may change
+their states meanwhile (:mod:`contfric.events.outcomes.long_holds`).
 
 Nothing can be held where rest is left without acceleration (static and kinetic limit agree, as in a system
 of Filippov): rest whose load touches its limit slips there for no time, and a slide that touches rest sticks
@@ -54,10 +55,10 @@ from contfric.events.local.holdable import (
 )
 from contfric.events.local.touching import chosen_at, crossed_at, entered_at
 from contfric.events.local.zero_acceleration import (
-    first_zero_acceleration,
     touch_of,
     touches_again,
 )
+from contfric.events.outcomes import long_holds
 from contfric.events.outcomes import standing_slides as slides
 from contfric.events.outcomes.contact_outcomes import continuous_edit, exchanged, modes_through
 from contfric.events.outcomes.grazing_impacts import grazing_impact, impact_at_joint
@@ -65,7 +66,7 @@ from contfric.models.definition import Model
 from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
 from contfric.signature.edits import Edit, drop, insert, split, swap_edit
-from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, left_surface, release_mode
+from contfric.signature.holds import TOUCH, ends_rest, hold_at, is_hold, of_another, release_mode
 
 #: A hold this short has no length: an event is located to about 1e-12, at a tangency to its root.
 NO_LENGTH = 1e-6
@@ -135,6 +136,8 @@ def outcome_at(orbit: Orbit, location: EventFunction, kind: Kind) -> Successor:
     if (orbit.model.composed and orbit.model.filippov) or crossed_at(orbit, location):
         edit, joints, away, reason = continuous_edit(orbit, location)
         return Successor(edit, joints, reason, away)
+    if (held := long_holds.at_beginning(orbit, location)) is not None:
+        return Successor(*held)
     if kind is Kind.CS:
         return _two_at_once(orbit, location.segment, location.surface)
     if kind is Kind.SS:
@@ -214,8 +217,7 @@ def _pinned_at_stop(orbit: Orbit, location: EventFunction) -> Successor:
 def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
     """AS: inside of a stick its load touches the limit."""
     model, itinerary, i = orbit.model, orbit.itinerary, location.segment
-    mode, exit_ = itinerary[i]
-    j = (i + 1) % len(itinerary)
+    mode = itinerary[i][0]
     touch = touch_of(orbit, i, location.surface)
     departs = _released(model, mode, location.surface)
     if leaves_smoothly(orbit, mode, departs):
@@ -226,17 +228,39 @@ def _limit_touched(orbit: Orbit, location: EventFunction) -> Successor:
         raise NotationError(
             f"{reason}: its equal was touched before, and what is left of it slides"
         )
-    still = first_zero_acceleration(orbit, i, touch[0], departs)
-    if still is not None:
-        left = (departs, left_surface(model, mode, departs))
-        edit = split(i, location.surface, (mode, TOUCH), left, (mode, exit_))
-        away = {(i, 1): _APPEARS[0], (i, 2): _APPEARS[1]}
-        return Successor(edit, {(i, 0): touch, (i, 1): still, (i, 2): still}, reason, away)
-    _same_way(orbit, mode, exit_, departs)
-    if is_hold(itinerary[j][1]):  # the stick ended tangentially: its hold begins earlier
-        edit = Edit(renamed={i: location.surface, j: TOUCH})
-        return Successor(edit, {(j, -1): touch}, reason)
-    return Successor(split(i, location.surface, (mode, TOUCH)), {(i, 0): touch}, reason)
+    rest = long_holds.Rest(orbit, i, float(touch[0]), departs)
+    return _held_through(orbit, rest, location.surface, ((mode, TOUCH),), {(i, 0): touch}, reason)
+
+
+def _held_through(
+    orbit: Orbit,
+    rest: long_holds.Rest,
+    first: str,
+    pairs: tuple[tuple[str, str], ...],
+    joints: dict[Origin, FloatArray],
+    reason: str,
+) -> Successor:
+    """Return the outcome in which a rest, or the rest of it, is held until it is released, or cannot be left.
+
+    Parameters
+    ----------
+    first : new exit of its first segment
+    pairs : what comes after that: the hold, if it begins inside
+    """
+    itinerary, k = orbit.itinerary, rest.parts[-1]
+    mode, exit_ = itinerary[k]
+    renamed, inserted = {rest.parts[0]: first, **rest.further}, {rest.parts[0]: pairs}
+    if rest.still is not None:
+        at, left = len(inserted.get(k, ())), (rest.departs[-1], rest.leaves)
+        inserted[k] = (*inserted.get(k, ()), left, (mode, exit_))
+        joints = {**joints, (k, at): rest.still, (k, at + 1): rest.still}
+        away = {(k, at): _APPEARS[0], (k, at + 1): _APPEARS[1]}
+        return Successor(Edit(frozenset(), renamed, inserted), joints, reason, away)
+    _same_way(orbit, mode, exit_, rest.departs[-1])
+    behind = (k + 1) % len(itinerary)
+    # one that ended tangentially was held from there on: that hold begins earlier
+    gone = frozenset({behind}) if is_hold(itinerary[behind][1]) else frozenset[int]()
+    return Successor(Edit(gone, renamed, inserted), joints, reason)
 
 
 def _touched_before(orbit: Orbit, location: EventFunction) -> bool:
@@ -267,22 +291,13 @@ def _rest_touched(orbit: Orbit, location: EventFunction) -> Successor:
 
 def _stick_becomes_hold(orbit: Orbit, j: int, hold: str, surface: str | None) -> Successor:
     """Return the outcome in which a stick that begins at the event is a hold."""
-    model, itinerary = orbit.model, orbit.itinerary
-    mode, exit_ = itinerary[j]
-    behind = (j + 1) % len(itinerary)
-    departs = itinerary[j - 1][0] if surface is None else _released(model, mode, surface)
-    reason = f"hold instead of stick {j + 1}"
-    still = first_zero_acceleration(orbit, j, float(orbit.cycle[j, 0]), departs)
-    if still is not None:
-        left = (departs, left_surface(model, mode, departs))
-        edit = split(j, hold, left, (mode, exit_))
-        away = {(j, 0): _APPEARS[0], (j, 1): _APPEARS[1]}
-        return Successor(edit, {(j, 0): still, (j, 1): still}, reason, away)
-    _same_way(orbit, mode, exit_, departs)
-    edit = split(j, hold)
-    if is_hold(itinerary[behind][1]):  # the stick ended tangentially: one hold replaces both
-        edit |= drop(behind)
-    return Successor(edit, {}, reason)
+    departs = (
+        orbit.itinerary[j - 1][0]
+        if surface is None
+        else _released(orbit.model, orbit.itinerary[j][0], surface)
+    )
+    rest = long_holds.Rest(orbit, j, float(orbit.cycle[j, 0]), departs)
+    return _held_through(orbit, rest, hold, (), {}, f"hold instead of stick {j + 1}")
 
 
 def _released(model: Model, mode: str, surface: str) -> str:
@@ -302,43 +317,46 @@ def _released(model: Model, mode: str, surface: str) -> str:
 def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     """Return what follows where a hold comes to an end of its freedom."""
     h, itinerary = location.segment, orbit.itinerary
-    before, behind = h - 1, (h + 1) % len(itinerary)
-    after_rest = ends_rest(orbit.model, *itinerary[before])
+    hold, before, behind = long_holds.hold_in(orbit, h), h - 1, (h + 1) % len(itinerary)
     at_touch = itinerary[h][1] == TOUCH
-    no_length = NO_LENGTH_AT_TOUCH if at_touch and not after_rest else NO_LENGTH
+    no_length = NO_LENGTH_AT_TOUCH if at_touch and not hold.after_rest else NO_LENGTH
     if orbit.durations[h] < no_length * time_unit(orbit) and vanishes_with(orbit, location):
+        if hold.until is not None:
+            raise NotationError(f"hold {h + 1} has no length, and goes on as {hold.until} is met")
+        if hold.follows:
+            return Successor(*long_holds.ends_earlier(orbit, h))
         reason = f"hold {h + 1} vanishes"
-        if at_touch and not after_rest:  # the slide goes on
+        if at_touch and not hold.after_rest:  # the slide goes on
             return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
         return Successor(drop(h), {}, reason)
+    if location.surface != hold.leaves and of_another(
+        orbit.model, itinerary[h][0], location.surface, hold.leaves
+    ):
+        if location.margin is Margin.JOINT and hold.until is None:
+            return Successor(*long_holds.goes_on(orbit, h, location.surface))
+        raise NotationError(f"{location.surface} is touched in hold {h + 1}, by another contact")
     if location.margin is Margin.JOINT:
+        if hold.until is not None:
+            raise NotationError(f"hold {h + 1} is at its limit just as {hold.until} is met")
         reason = f"hold {h + 1} lasts to its regular release at {location.surface}"
-        return Successor(_as_stick(orbit, h, location.surface, after_rest, ()), {}, reason)
+        return Successor(long_holds.as_sticks(orbit, h, location.surface), {}, reason)
     if location.margin is Margin.EXIT:
-        return _never_left(orbit, h, after_rest)
+        return _never_left(orbit, h)
     if location.margin is Margin.INTERIOR:
-        return _pin_moves(orbit, location, after_rest)
+        return _pin_moves(orbit, location, hold.after_rest)
     gone = orbit.durations[behind] < NEARLY_NO_LENGTH * time_unit(orbit)
     # a second hold, and the slide between them
-    if gone and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
-        return _never_left(orbit, h, after_rest)
-    touch = touch_of(orbit, h, None)
-    departs = itinerary[behind][0]
-    left = (departs, left_surface(orbit.model, itinerary[h][0], departs))
+    if gone and hold.until is None and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
+        return _never_left(orbit, h)
+    touch = long_holds.least_held(orbit, hold)
+    left = (hold.departs, hold.leaves)
     reason = f"hold {h + 1} cannot be left inside: a slide and a second hold"
     edit = insert(h, left, (itinerary[h][0], TOUCH))
     away = {(h, 0): _APPEARS_TOUCHING[0], (h, 1): _APPEARS_TOUCHING[1]}
     return Successor(edit, {(h, 0): touch, (h, 1): touch}, reason, away)
 
 
-def _as_stick(orbit: Orbit, h: int, surface: str, after_rest: bool, gone: tuple[int, ...]) -> Edit:
-    """Return the edit that makes a hold the stick that it stands for, and drops others."""
-    if after_rest:
-        return Edit(frozenset({h, *gone}), {(h - 1) % len(orbit.itinerary): surface})
-    return Edit(frozenset(gone), {h: surface})
-
-
-def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Successor:
+def _never_left(orbit: Orbit, h: int) -> Successor:
     """Return the outcome where the slide after a hold has vanished: the rest after it takes over."""
     itinerary, count = orbit.itinerary, len(orbit.itinerary)
     slide, rest = (h + 1) % count, (h + 2) % count
@@ -349,7 +367,8 @@ def _never_left(orbit: Orbit, h: int, after_rest: bool) -> Successor:
         raise RestsForEver(f"{reason} for ever: nothing else moves in a period")
     if itinerary[rest][1] == TOUCH:  # two holds become one
         return Successor(drop(slide, rest), {}, reason)
-    return Successor(_as_stick(orbit, h, itinerary[rest][1], after_rest, (slide, rest)), {}, reason)
+    edit = long_holds.as_sticks(orbit, h, itinerary[rest][1], slide, rest)
+    return Successor(edit, {}, reason)
 
 
 def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Successor:
@@ -362,7 +381,8 @@ def _pin_moves(orbit: Orbit, location: EventFunction, after_rest: bool) -> Succe
             raise NotationError(f"{reason}: the same orbits, for the load has equal maxima")
         edit = Edit(renamed={(h - 1) % len(orbit.itinerary): location.surface, h: TOUCH})
         return Successor(edit, {(h, -1): touch}, reason)
-    edit = split(h, location.surface, (orbit.itinerary[h][0], TOUCH))
+    edit = long_holds.as_sticks(orbit, h, location.surface)
+    edit = Edit(edit.dropped, edit.renamed, {h: ((orbit.itinerary[h][0], TOUCH),)})
     return Successor(edit, {(h, 0): touch}, reason)
 
 

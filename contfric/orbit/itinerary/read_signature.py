@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.crossed_surfaces import crossed_by
+from contfric.bvp.holds import holds_of
 from contfric.models.definition import Domain, Model
 from contfric.models.mode_domains import mode_domains
 from contfric.orbit.itinerary.itineraries import decode, end_domain, passed_domains
 from contfric.signature import Signature
-from contfric.signature.holds import TOUCH, domains_after, is_hold
+from contfric.signature.holds import domains_after, is_hold
 from contfric.signature.impacts import impact_at, mirror_name
 from contfric.simulation.starts import signs_at
 
@@ -150,14 +151,16 @@ def _nearest(domains: Sequence[Domain], signs: Mapping[str, int]) -> str:
 def _end_domains(orbit: Orbit) -> list[str]:
     """Domain in which each segment of the whole orbit ends."""
     found, itinerary, model = [], orbit.itinerary, orbit.model
+    held = {hold.segment: hold for hold in holds_of(model, itinerary)}
     for i, (mode, exit_) in enumerate(itinerary):
         end = orbit.ends[i]
         signs = _signs_at(orbit, float(end[0]), end[1:].copy())
-        after, following = itinerary[(i + 1) % len(itinerary)]
+        after = itinerary[(i + 1) % len(itinerary)][0]
         if is_hold(exit_):
             found.append(mode_domains(model, mode)[0])
             continue
-        if is_hold(following) and (mode == after or following != TOUCH):  # it leads beyond the hold
-            after = itinerary[(i + 2) % len(itinerary)][0]
+        hold = held.get(i + 1)
+        if hold is not None and (mode == after or hold.pin is not None):  # it leads beyond the hold
+            after = hold.departs
         found.append(end_domain(model, mode, exit_, after, signs))
     return found
