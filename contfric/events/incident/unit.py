@@ -28,8 +28,8 @@ from contfric.orbit.canonical.slides import (
 from contfric.orbit.clock import clocked
 from contfric.orbit.itinerary.itineraries import mirror_pairs
 from contfric.orbit.orbit import Orbit, Status
-from contfric.signature.edits import is_closed_walk, show
 from contfric.signature.holds import is_hold
+from contfric.signature.walks import is_closed_walk, show
 
 
 @dataclass(frozen=True, eq=False)
