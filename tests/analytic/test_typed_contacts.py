@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -25,12 +26,6 @@ resets:
   cam: {v: (1 + e)*h*W*sin(W*t)/2 - e*v, chatter: true}
   seat: {v: -es*v, chatter: true}
 """
-
-
-def typed(folder: Path, text: str) -> cf.Model:
-    path = folder / "typed.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
 
 
 class Valve:

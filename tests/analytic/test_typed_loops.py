@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 from contfric.events.sliding_kinds import kind_of_margin
@@ -49,12 +50,6 @@ modes:
 symmetry: x -> -x, v -> -v, z -> -z, t -> t + T/2
 spread: {x: 2, v: 2, z: 2}
 """
-
-
-def typed(folder: Path, text: str) -> cf.Model:
-    path = folder / "model.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
 
 
 def test_a_string_sticks_to_its_bow(tmp_path: Path) -> None:

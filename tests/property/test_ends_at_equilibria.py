@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.atlas import matching
@@ -43,19 +44,13 @@ spread: {x: 1, p: 11}
 """
 
 
-def load(folder: Path, text: str) -> cf.Model:
-    path = folder / "model.yaml"
-    path.write_text(text, encoding="utf-8")
-    return cf.load_model(path)
-
-
 def mckean(folder: Path, a: float, g: float, eps: float) -> tuple[cf.Model, float, float]:
     """Return McKean's neuron, and the currents at which v = g w rests on either surface.
 
     For eps < 0.2 and g < 1 the equilibria of all three pieces are nodes.
     """
     low, high = 0.5 * a * (1.0 + 1.0 / g), 0.5 * (1.0 + a) * (1.0 + 1.0 / g) - 1.0
-    return load(folder, MCKEAN.format(a=a, g=g, eps=eps, I=0.5 * (low + high))), low, high
+    return typed(folder, MCKEAN.format(a=a, g=g, eps=eps, I=0.5 * (low + high))), low, high
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -110,7 +105,7 @@ def test_a_cycle_run_through_several_times_is_one_cycle(turns: int, tmp_path: Pa
 
 def test_cycles_of_any_number_of_flights_graze_at_one_event(tmp_path: Path) -> None:
     """The cycles of 1, 2 and 4 loops all are the smooth cycle there, run through so many times."""
-    orbit = cf.find_orbit(load(tmp_path, VALVE), state=[3.0, 0.0, 15.0])
+    orbit = cf.find_orbit(typed(tmp_path, VALVE), state=[3.0, 0.0, 15.0])
     diagram = cf.explore(orbit, "q", (3.0, 9.0))
     (grazing,) = (n for n in diagram.nodes if abs(n.bifurcation.params["q"] - 7.557211) < 1e-5)
     assert grazing.bifurcation.kind is cf.Kind.GS
