@@ -188,7 +188,25 @@ def ascending(name: str, given: object) -> FloatArray:
         raise ParameterError(
             f"the values of '{name}' are a list of finite numbers in ascending order, got {shown(given)}"
         )
+    if _is_range(given, values):
+        low, high, count = *values[:2], values[2] if len(values) == 3 else 200
+        raise ParameterError(
+            f"the values of '{name}' are a list of all values, and {shown(given)} looks like a range: write "
+            f"numpy.linspace({low:g}, {high:g}, {count:g}); or, if these are the values, a numpy.array"
+        )
     return values
+
+
+def _is_range(given: object, values: FloatArray) -> bool:
+    """Tell whether values look like a range (low, high), or like [low, high, number] of a study."""
+    if not isinstance(given, (tuple, list)) or len(given) not in (2, 3):
+        return False
+    if len(given) == 2:
+        return isinstance(given, tuple)
+    first, second = np.diff(values)
+    whole = isinstance(given[2], int) and given[2] >= 2
+    ends = isinstance(given, tuple) or not all(isinstance(x, int) for x in given)
+    return whole and ends and not np.isclose(first, second)
 
 
 def _checked_params(

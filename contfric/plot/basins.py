@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
 
 from contfric.plot.appearance.cells import draw_cells
 from contfric.plot.appearance.names import parameter_label
@@ -32,6 +33,13 @@ _ORBIT: dict[str, Any] = {
     "markeredgecolor": "black",
     "markersize": 5,
 }
+#: How an orbit without excitation is drawn, and at how many times.
+_CYCLE: dict[str, Any] = {
+    "color": "white",
+    "lw": 1.2,
+    "path_effects": [Stroke(linewidth=2.4, foreground="black"), Normal()],
+}
+_ALONG = 400
 #: Id of the legend of basins, which a stable set over them adds its lines to.
 _LEGEND = "basins"
 #: What a legend says of starts without a solution.
@@ -66,8 +74,10 @@ def plot_basins(found: Basins, ax: Axes | None = None) -> Axes:
     names = [f"{_NONE.get(s.name, s.name)}: {s.share:.1%}" for s in found.shares]
     shown = zip(colours, names, strict=True)
     handles: list[Artist] = [Patch(color=colour, label=name) for colour, name in shown]
-    if found.orbits and not found.model.autonomous:
-        handles.append(Line2D([], [], **_ORBIT, label="the orbits, once a period"))
+    if found.orbits:
+        autonomous = found.model.autonomous
+        label = "the orbits" if autonomous else "the orbits, once a period"
+        handles.append(Line2D([], [], **(_CYCLE if autonomous else _ORBIT), label=label))
     if found.missing:
         handles.append(Line2D([], [], ls="", label=f"{found.missing} starts not computed"))
     _explain(ax, handles)
@@ -89,16 +99,17 @@ def _shown(found: Basins) -> list[str]:
 
 
 def _draw_orbits(ax: Axes, found: Basins, first: str, second: str) -> None:
-    """Mark where the orbits are at the phase of the starts, once in each period."""
+    """Mark where the orbits are at the phase of the starts, once a period; without excitation draw them."""
     names = found.model.states
     i, j = names.index(first), names.index(second)
     for orbit in found.orbits:
         if found.model.autonomous:
-            continue
-        turn = orbit.period / orbit.periods
-        times = (found.at["phase"] + np.arange(orbit.periods)) * turn
+            shares, look = np.arange(_ALONG + 1) / _ALONG, _CYCLE
+        else:
+            shares, look = (found.at["phase"] + np.arange(orbit.periods)) / orbit.periods, _ORBIT
+        times = np.asarray(shares * orbit.period)
         states = np.array([orbit.state(float(t)) for t in times])
-        ax.plot(states[:, i], states[:, j], **_ORBIT)
+        ax.plot(states[:, i], states[:, j], **look)
 
 
 def plot_stable_set(found: StableSet, ax: Axes | None = None) -> Axes:

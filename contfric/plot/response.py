@@ -24,6 +24,9 @@ _COLOURS = {"up": "#1F4E79", "down": "#C04F15"}
 _BACKGROUND = lighter(GREY, 0.2)
 #: Size of a point: a thousand values give a thousand columns, which a page does not resolve finer.
 _POINT = 1.2
+#: Largest size, of few values; values times size that fill the width of axes; and how much larger points of
+#: the first direction are.
+_LARGE, _DENSE, _LARGER = 4.0, 400.0, 1.8
 
 
 def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -> Axes:
@@ -45,9 +48,13 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
     """
     name = sweep.model.states[sweep.state_index(state)]
     ax = axes_or_new(ax)
-    for direction in sweep.runs:
+    size = max(_POINT, min(_LARGE, _DENSE / len(sweep.values)))
+    for k, direction in enumerate(sweep.runs):
         x, y = sweep.points(direction, state)
-        _draw(ax, x, y, _COLOURS[direction], 2.0, direction)
+        rest = (
+            len(sweep.runs) - 1 - k
+        )  # points of the first one are larger: seen below those of the second
+        _draw(ax, x, y, _COLOURS[direction], 2.0, direction, size * _LARGER**rest)
     name_axes(
         ax,
         parameter_label(sweep.parameter),
@@ -55,7 +62,7 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
     )
     ax.set_title(fixed_text(told(sweep.params, sweep.model.defaults)), fontsize=sized(TEXT))
     if len(sweep.runs) > 1:
-        ax.legend(fontsize=sized(SMALL), markerscale=4.0, loc="best")
+        ax.legend(fontsize=sized(SMALL), markerscale=4.0 * _POINT / size, loc="best")
     return ax
 
 
@@ -92,10 +99,16 @@ def overlay_handle() -> Line2D:
 
 
 def _draw(
-    ax: Axes, x: FloatArray, y: FloatArray, colour: str, zorder: float, label: str | None
+    ax: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    colour: str,
+    zorder: float,
+    label: str | None,
+    size: float = _POINT,
 ) -> None:
     (points,) = ax.plot(
-        x, y, linestyle="none", marker=".", markersize=_POINT, color=colour, zorder=zorder
+        x, y, linestyle="none", marker=".", markersize=size, color=colour, zorder=zorder
     )
     points.set_label(label or "_nolegend_")
     points.set_rasterized(True)  # a vector file of a million points opens nowhere

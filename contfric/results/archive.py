@@ -228,10 +228,17 @@ def _read(path: Path) -> Arrays:
         # an npz is a zip; anything else np.load would try to read in other ways
         with path.open("rb") as file:
             if file.read(2) != b"PK":
+                if path.suffix != ".npz":
+                    raise ResultFileError(
+                        f"{path} is no file of results: cf.load reads .npz files, which cf.save and "
+                        "runs write; cf.load_model reads models, cf.run_study studies"
+                    )
                 raise zipfile.BadZipFile("it is no npz file")
             file.seek(0)
             with np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in archive.files}
+    except ResultFileError:
+        raise
     except OSError as error:
         raise ResultFileError(f"cannot read {path}: {error.strerror or error}") from None
     except Exception as error:  # the readers of zip and npy raise a dozen kinds on damaged bytes

@@ -210,6 +210,12 @@ def test_without_excitation() -> None:
         assert orbit.period == pytest.approx(found.orbits[label].period, abs=1e-9)
     with pytest.raises(cf.ParameterError, match="no phase"):
         cf.basins(belt, grid, None, {"phase": 0.2})
+    ax = found.plot()  # orbits are closed lines: each point of them is a state of the orbit
+    for line, orbit in zip(ax.lines, found.orbits, strict=True):
+        x, y = (np.asarray(line.get_data()[k], dtype=float) for k in (0, 1))
+        assert len(x) > 100 and np.hypot(x[-1] - x[0], y[-1] - y[0]) < 1e-9
+        assert x.max() == pytest.approx(orbit.x_max, abs=1e-3 * np.ptp(x))
+    assert ax.get_legend().get_texts()[-1].get_text() == "the orbits"
 
 
 def test_the_same_bits_for_any_tiles_and_without_workers(three: cf.Basins) -> None:

@@ -818,6 +818,9 @@ def test_a_branch_that_grows_without_bound_leaves_the_axes() -> None:
         low, high = branch.plot(row=row).get_ylim()
         far = branch.x_max[np.abs(branch.values - 1.0) > 0.05 * np.ptp(branch.values)]
         assert far.max() < high < 3.0 * far.max() and low < far.min()
+    phases = branch.quantity("phase(x, 1)")  # they change most there, and stay small
+    low, high = branch.plot(row="phase(x, 1)").get_ylim()
+    assert low < phases.min() and phases.max() < high
 
 
 def test_multipliers_jump_where_a_branch_ends(diagram: Any) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.chaos.compute import ascending
 from contfric.study.result import RunStatus
 
 GRID = np.linspace(0.3, 0.6, 150)
@@ -171,6 +172,13 @@ def test_saved_table_and_drawn(tmp_path: Path) -> None:
     assert len(ax.lines) == 2 and len(ax.lines[0].get_xdata()) == len(sweep.up)
 
 
+@pytest.mark.parametrize(
+    "values", [[0.4, 0.6], (0.4, 0.5, 0.6), (1, 2, 3), [1, 10, 100], [0.4, 1.5, 2.0]]
+)
+def test_few_values_are_values(values: Any) -> None:
+    assert ascending("Omega", values).tolist() == list(values)
+
+
 def test_overlay() -> None:
     orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
     diagram = cf.explore(orbit, "Omega", (0.45, 0.55))
@@ -241,6 +249,9 @@ def test_every_model_has_a_section_where_none_is_named(model: str, section: str 
         ({"parameter": "Omga"}, "did you mean 'Omega'"),
         ({"values": [0.5, 0.4]}, "ascending"),
         ({"values": []}, "ascending"),
+        ({"values": (0.4, 0.6)}, r"looks like a range: write numpy.linspace\(0.4, 0.6, 200\)"),
+        ({"values": (0.4, 0.6, 2000)}, r"numpy.linspace\(0.4, 0.6, 2000\)"),
+        ({"values": [0.4, 0.6, 30]}, "looks like a range"),
         ({"direction": "sideways"}, "direction is one of"),
         ({"section": "F"}, "no section 'F'.* Valid: stops, releases, F[+], F-, v, or a phase"),
         ({"section": 1.0}, "0 <= phase < 1"),

@@ -145,9 +145,11 @@ def row_of(asked: QuantityLike, model: Model | None) -> DiagramRow:
         return _in_units(ROWS[asked], asked, model)
     names = [*NAMED, *(n for n, _ in model.quantities)] if model is not None else [*ROWS]
     word = isinstance(asked, str) and asked.isidentifier()
-    found = quantity_of(asked, model) if model is not None else None
-    if found is None or (word and asked not in names):
+    if model is None or (word and asked not in names):
+        if model is not None and {asked, str(asked).rpartition("_")[0]} & {*model.states}:
+            quantity_of(asked, model)  # a state: it says how to ask for its extremum
         raise ParameterError(f"no row '{asked}' in a diagram{did_you_mean(asked, names)}")
+    found = quantity_of(asked, model)
     label = found.name.rpartition(":")[-1] if found.named is None else found.named.label
     return DiagramRow(label, found.even)
 

@@ -53,6 +53,8 @@ _COLUMN, _TICKS = 4.5, 5
 _MARGIN = 0.12
 #: A branch that grows without bound leaves the axes this share of the range of the branches before its end.
 _RESONANCE = 0.05
+#: It leaves them where its values spread so many times as widely as the others.
+_GROWN = 10.0
 #: Ratio of a multiplier to the next smaller one above which it is without bound: between two points of a
 #: branch a multiplier grows by less, and at a grazing impact it is what rounding leaves of infinity, 1e13.
 _SPIKE = 1e6
@@ -292,7 +294,7 @@ def draw_row(
     if row == "multiplier":
         _cut_spikes(ax)
     else:
-        _cut_resonances(ax, branches)
+        _cut_resonances(ax, branches, marks)
     displacement = branches[0].model.states[0] if branches else "x"
     across = parameter_label(branches[0].parameter) if branches else None
     name_axes(ax, across, label.name(displacement))
@@ -312,8 +314,8 @@ def _cut_spikes(ax: Axes) -> None:
         ax.set_ylim(0.0, (1.0 + _MARGIN) * sizes[spikes[0]])
 
 
-def _cut_resonances(ax: Axes, branches: Sequence[Branch]) -> None:
-    """Let lines leave the axes where a branch grows without bound: what is not near to it is to be seen."""
+def _cut_resonances(ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark]) -> None:
+    """Let lines leave the axes where a branch grows without bound: events and what is farther are seen."""
     ends = [(b.values[0], b.values[-1]) for b in branches]
     at = [
         x[side]
@@ -326,9 +328,11 @@ def _cut_resonances(ax: Axes, branches: Sequence[Branch]) -> None:
     names = {b.name for b in branches}
     x, y = np.concatenate([line.get_xydata() for line in ax.lines if line.get_gid() in names]).T
     far = np.min(np.abs(x[:, None] - at), axis=1) > _RESONANCE * np.ptp(ends)
-    shown = y[far & np.isfinite(y)]
-    if len(shown) and np.ptp(shown) > 0.0:
-        ax.set_ylim(shown.min() - _MARGIN * np.ptp(shown), shown.max() + _MARGIN * np.ptp(shown))
+    shown = np.concatenate([y[far & np.isfinite(y)], *(mark.y for mark in marks)])
+    if not len(shown) or np.ptp(y[np.isfinite(y)]) <= _GROWN * np.ptp(shown):
+        return  # what grows is not shown, such as a phase
+    margin = _MARGIN * (np.ptp(shown) or 1.0)
+    ax.set_ylim(shown.min() - margin, shown.max() + margin)
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:

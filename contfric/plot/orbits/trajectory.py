@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 _THIN, _POINT = 0.8, 3.0
 #: Points between two events, on average, that make curves smooth; how many there are at least and at most.
 _EACH, _LEAST_POINTS, _MOST_POINTS = 50, 1000, 100_000
+#: Modes that a legend names, of more than these those in which most of the time is spent.
+_MOST_NAMED = 12
 #: Share of the period that the tail after a moving point shows.
 _TAIL = 0.08
 #: Frames of an animation: minutes of film, and what a gif of some megabytes holds.
@@ -57,16 +60,17 @@ def plot_trajectory(
     states = trajectory.model.states
     across, up = ("t", states[0]) if len(states) == 1 else states[:2]
     ax = axes_or_new(ax)
-    colours = branch_colours(columns["mode"])
-    named: set[str] = set()
+    colours, shares = branch_colours(columns["mode"]), Counter(columns["mode"])
+    named = dict(shares.most_common(_MOST_NAMED))
     for mode, rows in groupby(range(len(columns["t"])), key=columns["mode"].__getitem__):
         part = list(rows)
-        label = None if mode in named else mode
-        named.add(mode)
+        label = mode if named.pop(mode, 0) else None
         ax.plot(
             columns[across][part], columns[up][part], color=colours[mode], lw=_THIN, label=label
         )
     ax.plot(columns[across][0], columns[up][0], "o", color=BLACK, ms=_POINT, label="start")
+    if len(shares) > _MOST_NAMED:
+        ax.plot([], [], ls="none", label=f"and {len(shares) - _MOST_NAMED} more modes")
     ax.set_xlabel(parameter_label(across))
     ax.set_ylabel(parameter_label(up))
     ax.legend(fontsize=sized(SMALL), frameon=False, **NEXT_TO)
