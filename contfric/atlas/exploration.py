@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from contfric.atlas.collect import Event
 from contfric.atlas.matching import (
+    ROUNDING,
     SAME_SOLUTION,
     identity,
     identity_of,
@@ -39,9 +40,9 @@ _PASSED = frozenset({Kind.SN, Kind.T, Kind.NS})
 #: Kinds that a branch meets once each time that it passes them: a curve may come back to a branch point.
 _ONE_AFTER_ANOTHER = frozenset({Kind.SN, Kind.PD, Kind.NS})
 #: The tip of a branch whose parameter (relative to the range) and stops agree with an event to these is
-#: at the event; one that is located agrees to the last, or to what it is known to: two sides of a symmetric
+#: at the event; one that is located agrees to rounding, or to what it is known to: two sides of a symmetric
 #: orbit may meet their events one after the other within the first.
-_SAME_LOCATION, _SAME_STOPS, _LOCATED = 1e-8, 1e-6, 1e-10
+_SAME_LOCATION, _SAME_STOPS = 1e-8, 1e-6
 
 
 def _alike(one: Orbit, other: Orbit) -> bool:
@@ -249,7 +250,7 @@ class Exploration:
                 if b is not None:
                     if same_event(b, event.bifurcation, self.settings.parameter, width):
                         return index
-                    known = max(_LOCATED, 2.0 * max(b.accuracy, event.bifurcation.accuracy))
+                    known = max(ROUNDING, 2.0 * max(b.accuracy, event.bifurcation.accuracy))
                 gap = abs(tip.params[branch.parameter] - orbit.params[branch.parameter])
                 near = stops_distance(tip.stops, orbit.stops, mirror) < _SAME_STOPS
                 if gap < known * width and near and _alike(tip, orbit):

@@ -93,6 +93,7 @@ calls = {
     ),
     "basins": (lambda: cf.basins(model, plane, start), lambda b: not b.complete),
     "poincare": (lambda: cf.poincare(model, start, periods=1e7), None),
+    "verify": (lambda: narrow.verify(), None),
     "period_adding": (lambda: cf.period_adding(bridge, longest=8) if bridge else None, None),
 }
 faulthandler.enable()
@@ -121,7 +122,7 @@ KEPT = (
     "sweep",
     "basins",
 )
-RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "poincare", "period_adding")
+RAISED = ("find_orbit", "simulate", "lyapunov_exponent", "poincare", "verify", "period_adding")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as a terminal sends them")

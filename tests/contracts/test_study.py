@@ -635,6 +635,21 @@ def test_interrupted_branch_is_saved(tmp_path, write, monkeypatch) -> None:
     assert loaded.ends[1].reason is EndReason.INTERRUPTED
 
 
+def test_interrupted_checks_of_a_diagram_keep_it(tmp_path, write) -> None:
+    # a restart that was cut was compared as if it were whole, and the next one began
+    text = HEAD + "explore: {parameter: Omega, range: [0.49, 0.52], verify: true}\n" + ALL
+    result = cf.run_study(
+        write(text), tmp_path / "out", progress=interrupt_at("explored again from its own")
+    )
+    assert result.status is RunStatus.INTERRUPTED
+    assert result.diagram is not None
+    assert isinstance(cf.load(result.out / "diagram.npz"), cf.Diagram)
+    again = cf.run_study(write(text), tmp_path / "out")
+    assert again.status is RunStatus.DONE
+    assert again.diagram is not None and again.diagram.complete and again.diagram.verified
+    assert len(again.diagram.branches) == len(result.diagram.branches)
+
+
 @pytest.mark.parametrize("task", [EXPLORE, CONTINUE])
 def test_interrupted_before_the_orbit(tmp_path, write, task) -> None:
     result = cf.run_study(write(HEAD + task), tmp_path / "out", progress=interrupt_at("simulating"))

@@ -296,13 +296,13 @@ def _beside(
     if following is None or is_short(branch):
         return None
     # in the middle of what is beyond the slack, where the parameter goes on to the next event
-    ahead_by = abs(following.params[branch.parameter] - value)
-    share = 0.5 * (1.0 + slack / ahead_by) if ahead_by > slack else 0.5
+    onward = following.params[branch.parameter] - value
+    share = 0.5 * (1.0 + slack / abs(onward)) if abs(onward) > slack else 0.5
     solved = _solved_at(branch, position + share * (reach - position), width)
-    if solved is None:
-        return None
-    gap = solved.params[branch.parameter] - value
-    return (int(np.sign(gap)), solved) if abs(gap) > slack else None
+    gap = 0.0 if solved is None else solved.params[branch.parameter] - value
+    # up to an event that is beyond the slack a branch is on its side, however short it is
+    gap = onward if abs(onward) > slack >= abs(gap) else gap
+    return None if solved is None or abs(gap) <= slack else (int(np.sign(gap)), solved)
 
 
 def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:

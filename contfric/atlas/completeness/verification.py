@@ -267,7 +267,7 @@ def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
     from contfric.atlas.explore import explore
 
     asked = diagram.settings
-    return explore(
+    again = explore(
         start,
         diagram.parameter,
         diagram.range,
@@ -280,6 +280,9 @@ def _explored(diagram: Diagram, start: Orbit, step: float) -> Diagram:
         max_points=max(asked.max_points, int(asked.max_points / step)),
         stop_at=dict(asked.stop_at),
     )
+    if EndReason.INTERRUPTED.value in again.notes:  # what is missing differs in nothing
+        raise KeyboardInterrupt
+    return again
 
 
 def differences(one: Diagram, other: Diagram) -> Iterator[str]:

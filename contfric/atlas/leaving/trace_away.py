@@ -42,8 +42,6 @@ _BESIDE = 0.5**0.5
 _NOWHERE = 1e-7
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
-#: Two events this many times their accuracies apart are two.
-_TOLD = 4.0
 #: The first start near an event that is singular, in roots of rounding: states are known there to a share
 #: of 1e-5, and what happens nearer changes the parameter by rounding only (by the square of this).
 _KNOWN = 500.0
@@ -259,7 +257,7 @@ def went_somewhere(side: Side, event: Event, settings: Settings) -> bool:
     if rough or end is None or end.kind not in TERMINAL or side_is_bridge(side):
         return False
     gap = abs(end.params[settings.parameter] - there.params[settings.parameter]) / settings.width
-    return gap > _TOLD * (there.accuracy + end.accuracy)
+    return gap > there.accuracy + end.accuracy
 
 
 def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:

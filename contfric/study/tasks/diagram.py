@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import Field
 
+from contfric.base.attributes import altered
 from contfric.base.yaml_schema import Truth, keys_of, whole
 from contfric.errors import number_and
 from contfric.study.tasks.one_parameter import OneParameter
@@ -59,6 +60,7 @@ class ExploreTask(OneParameter):
     def compute(self, job: Job) -> Diagram:
         """Explore; on Ctrl-C the diagram found so far, with ``complete`` False."""
         from contfric.atlas.explore import explore
+        from contfric.events.bifurcation import EndReason
 
         diagram = explore(
             job.found["orbit"],
@@ -72,7 +74,12 @@ class ExploreTask(OneParameter):
         )
         if not diagram.branches:
             raise KeyboardInterrupt  # before the first branch was done
-        if self.verify and diagram.complete:
+        if not (self.verify and diagram.complete):
+            return diagram
+        try:
             job.say("verify: explored again from its own branches")
             diagram.verify()
+        except KeyboardInterrupt:  # the diagram is kept; the same command goes on with its checks
+            notes = (*diagram.notes, EndReason.INTERRUPTED.value)
+            return altered(diagram, complete=False, notes=notes)
         return diagram
