@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import contfric as cf
+from contfric.base.tally import counts
 
 SOFT_STOP = (
     Path(__file__).resolve().parents[2] / "benchmarks" / "stress" / "typed" / "softstop.yaml"
@@ -58,3 +59,14 @@ def test_a_point_on_a_segment_of_no_length_makes_no_label_change_elsewhere() -> 
     diagram = cf.explore(begun, "omega", (0.4469979761394101, 1.1953686313574419), max_periods=2)
     found = diagram.verify(6)
     assert found.passed, str(found)
+
+
+def test_a_label_that_the_end_of_a_branch_changes_is_not_searched_for() -> None:
+    """One point just before the event tells; a search solves for twenty, and finds the event again."""
+    orbit = cf.solve_orbit("coulomb", "1a", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+    before = counts()
+    branch = cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
+    solves = (counts() - before).newton_solves
+    assert [b.kind.name for b in branch.bifurcations] == ["SS", "T", "SN", "CS"]
+    assert branch[0].labels.tolist() != branch[1].labels.tolist()
+    assert len(branch) < solves < len(branch) + 82

@@ -94,7 +94,7 @@ def _told_before(step: Step) -> Point | None:
     bend = abs(event.value - before.value - before.slope * length) / length**2
     back = min(SAME_FOLD, 0.5 * length, float(np.sqrt(least / bend)) if bend > 0.0 else np.inf)
     while back > SAME_LOCATION:
-        point = _point_at(step, _WITHIN * back)
+        point = point_at(step, _WITHIN * back)
         left = np.inf if point is None else abs(event.value - point.value)
         if left <= least:
             return point
@@ -102,7 +102,7 @@ def _told_before(step: Step) -> Point | None:
     return None
 
 
-def _point_at(step: Step, back: float) -> Point | None:
+def point_at(step: Step, back: float) -> Point | None:
     """Solve for the point at a distance before the sliding event of a step; None if Newton goes astray.
 
     It is predicted by the parabola through both locations with the tangent at the first one: that at the

@@ -14,10 +14,6 @@ from contfric.continuation.core.steps import EXTRA
 
 #: Share of the smaller end value above which the minimum of an interpolation is believed to stay positive.
 _SURE = 0.2
-#: A step that may have a minimum near zero in it is taken again up to this share of the way there: what comes
-#: to zero as a square, such as where a segment shrinks to nothing, is approached from before it. Not up to
-#: more than the second share of the step, and not less than the third: the parabola is rough.
-_SHORT_OF, _MOST_AGAIN, _LEAST_AGAIN = 0.97, 0.75, 0.05
 #: Slopes are computed where a value is smaller than this times its change over two steps (see above).
 _NEAR = 1.0
 
@@ -36,12 +32,12 @@ def earlier_of(at, share):  # type: ignore[no-untyped-def]
 
 @helper
 def dips(way, tests, k, arc, value, step):  # type: ignore[no-untyped-def]
-    """Return up to which share a step is taken again, as some test may be zero twice within; 0 if none may.
+    """Tell whether some test, positive at both ends of a step, is likely to be negative within.
 
-    By the parabola through the last two points and the new one, with one sign at all three. What a label
-    changes at has slopes, and is the least of many distances: no parabola.
+    By the parabola through the last two points and the new one. What a label changes at has slopes, and is
+    the least of many distances: no parabola.
     """
-    back, earliest = arc[k] - arc[k - 1], 0.0
+    back = arc[k] - arc[k - 1]
     followed, interior = way.workspace.followed, way.layout.interior.shape[0]
     here = followed.slots[HERE]
     last = value.shape[0] - EXTRA
@@ -62,10 +58,8 @@ def dips(way, tests, k, arc, value, step):  # type: ignore[no-untyped-def]
         if at < step and abs(f1) + 0.5 * slope * at * math.copysign(1.0, f1) < _SURE * min(
             abs(f1), abs(f2)
         ):
-            earliest = earlier_of(earliest, at / step)
-    if earliest == 0.0:
-        return 0.0
-    return min(_MOST_AGAIN, max(_LEAST_AGAIN, _SHORT_OF * earliest))
+            return True
+    return False
 
 
 @helper

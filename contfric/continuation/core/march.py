@@ -94,11 +94,9 @@ def arrival(way, course, k, taken, step):  # type: ignore[no-untyped-def]
 @helper
 def accepted_share(way, points, k, length, step):  # type: ignore[no-untyped-def]
     """Return up to which share a step is taken again, as something may be undone in it; 1 if it is not."""
-    share = 0.0
-    if k > 0:
-        share = dips(way, points.tests, k, points.arc, points.tests[k + 1], step)
-    if share == 0.0:
-        share = hidden_pair(way, points, k, length)
+    if k > 0 and dips(way, points.tests, k, points.arc, points.tests[k + 1], step):
+        return 0.25
+    share = hidden_pair(way, points, k, length)
     return share if share > 0.0 else 1.0
 
 

@@ -89,8 +89,8 @@ def sliding_events(
         if k == first
         or (
             abs(point.tests[k]) < together
-            and kind_of_margin(orbit.system, test, here) is kind
             and _is_free(orbit.system.tests[first], test)
+            and kind_of_margin(orbit.system, test, here) is kind
         )
     )
     group = _once(here, group)

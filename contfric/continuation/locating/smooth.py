@@ -15,6 +15,7 @@ from contfric.continuation.accuracy.near_sliding_events import (
     SAME_VALUE,
     first_told,
     last_told,
+    point_at,
 )
 from contfric.continuation.families.continuum import LEVEL
 from contfric.continuation.half_branch import first_point
@@ -229,10 +230,12 @@ def _changes(step: Step, k: int) -> list[Located]:
     """Return the changes of one label between two points at which it differs."""
     found: list[Located] = []
     orbit, settings = step.orbit, step.settings
+    vanishes = _vanishes(step, k)
+    if vanishes and _stays_to_end(step, k):
+        return found
     locations = locate_label(orbit, step.before, step.after, settings, k)
     if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
         locations.pop()
-    vanishes = _vanishes(step, k)
     if not locations and not (vanishes or _meets(orbit, k, step.orbit_at(step.after))):
         found.append(not_located(step, Kind.T))
     for point in locations:
@@ -246,6 +249,14 @@ def _changes(step: Step, k: int) -> list[Located]:
         b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
         found.append((b, point))
     return found
+
+
+def _stays_to_end(step: Step, k: int) -> bool:
+    """Tell whether a label is that of the first point up to the event at the last one: it changes there."""
+    if step.length <= 2.0 * SAME_TANGENCY:
+        return False
+    near = point_at(step, SAME_TANGENCY)
+    return near is not None and bool(near.labels[k] == step.before.labels[k])
 
 
 def _stays(step: Step, k: int, point: Point) -> bool:
@@ -270,6 +281,8 @@ def _undone(step: Step, others: list[Located]) -> list[Located]:
 
     orbit, before, after = step.orbit, step.before, step.after
     found: list[Located] = []
+    if not (before.labels == after.labels).any():
+        return found
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
     for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
         if other.arc - one.arc < SAME_TANGENCY or one.value == other.value:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -42,9 +42,12 @@ Sides = frozenset[tuple[str, int]]
 def check_continuity(report: ModelReport, probe: Probe) -> None:
     """Check that no field and no observable jumps inside of a mode."""
     pole = _without_values(report, probe)
+    gentle = _gentle_modes(probe)
     for mode in probe.model.modes:
         for name, line, low, high in lines_in(probe, mode.name):
             report.count(Topic.CONTINUITY)
+            if mode.name in gentle:
+                continue
             found = jump_along(partial(_values_on, probe, mode.name, line), low, high)
             if found is None:
                 continue
@@ -69,6 +72,21 @@ def check_continuity(report: ModelReport, probe: Probe) -> None:
                 "as sin(2*pi*t/T) that changes its sign there)",
             )
             return
+
+
+def _gentle_modes(probe: Probe) -> set[str]:
+    """Return the modes in which nothing jumps, by their formulas: no place of these has to be tried."""
+    formulas = probe.formulas
+    if formulas is None:
+        return set()
+    from contfric.models.language.formulas import is_gentle
+
+    moving = (formulas.t, *formulas.y)
+    if not all(is_gentle(value, moving) for value in formulas.observables()):
+        return set()
+    # modes of a structure differ in few of their rates
+    gentle = cache(lambda rate: is_gentle(formulas.read(("modes",), rate), moving))
+    return {m.name for m in formulas.description.modes if all(map(gentle, m.field))}
 
 
 def check_jumps_through(report: ModelReport, probe: Probe) -> None:
@@ -113,11 +131,16 @@ def _height_on(probe: Probe, surface: str, line: Line, place: float) -> FloatArr
 def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
     """Warn of observables of surfaces that have a kink in time within a mode: rates locate crossings."""
     names = list(dict.fromkeys(s.observable for s in probe.model.surfaces))
-    for mode in probe.model.modes if probe.period > 0.0 else ():
+    if probe.period == 0.0:
+        return
+    smooth = _is_smooth_in_time(probe, names)
+    for mode in probe.model.modes:
         for name, line, low, high in lines_in(probe, mode.name):
             if name != "t":
                 continue
             report.count(Topic.CONTINUITY)
+            if smooth:
+                continue
             found = jump_along(partial(_rates_on, probe, mode.name, names, line), low, high)
             if found is not None:
                 report.warn(
@@ -127,6 +150,17 @@ def check_kinks_in_time(report: ModelReport, probe: Probe) -> None:
                     "Make the place a surface, with a mode on each side",
                 )
                 return
+
+
+def _is_smooth_in_time(probe: Probe, names: list[str]) -> bool:
+    """Tell whether formulas say that some observables have no kinks in time."""
+    formulas = probe.formulas
+    if formulas is None:
+        return False
+    from contfric.models.language.formulas import is_smooth
+
+    pairs = zip(formulas.description.observables, formulas.observables(), strict=True)
+    return all(is_smooth(value, (formulas.t,)) for o, value in pairs if o.name in names)
 
 
 def _rates_on(

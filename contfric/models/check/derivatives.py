@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import mpmath
@@ -63,7 +63,8 @@ class Case:
     """One compiled function of (t, state, parameters), and its formula.
 
     ``compiled`` returns values (m,) and derivatives (m, variables) at a point; ``formula`` the values.
-    ``mode`` is the mode whose states it is compared at, None for all states.
+    ``mode`` is the mode whose states it is compared at, None for all states. ``names`` are those that the
+    formula depends on, in any way; all, if nothing is known.
     """
 
     what: str
@@ -71,6 +72,7 @@ class Case:
     formula: Formula
     mode: str | None = None
     step: Any = _INNER
+    names: frozenset[str] | None = None
 
 
 def check_derivatives(report: ModelReport, probe: Probe) -> None:
@@ -146,7 +148,14 @@ def _compare(
                 exact = np.array([float(v) for v in case.formula(place)])
                 # relative to a small variable: an inertia of 1e-5, a capacity
                 steps = [case.step * (min(1, abs(x)) or 1) for x in place]
-                slope = np.array(slopes(case.formula, place, steps), dtype=np.float64)
+                own = [
+                    i for i, name in enumerate(names) if case.names is None or name in case.names
+                ]
+                slope = np.zeros((len(exact), len(point)))
+                if own:  # by what does not occur the derivative is 0
+                    slope[:, own] = np.array(
+                        slopes(case.formula, place, steps, own), dtype=np.float64
+                    )
             except (TypeError, ValueError, ArithmeticError):
                 return False
     else:
@@ -188,19 +197,28 @@ def _cases(probe: Probe) -> list[Case]:
     flow, ends = model.flow, model.surfaces
     cases = _Described(model) if model.definition else _Cases(model)
     found = [
-        Case(f"observable '{o.name}'", cases.scalar(flow.observe, c), cases.observable(o.name))
+        Case(
+            f"observable '{o.name}'",
+            cases.scalar(flow.observe, c),
+            cases.observable(o.name),
+            names=cases.names_of_observable(o.name),
+        )
         for c, o in enumerate(model.observables)
     ]
     for m, mode in enumerate(model.modes):
         found += cases.field(m, mode.name)
         for c, o in enumerate(model.observables):
             what, rate = f"rate of '{o.name}' in mode '{mode.name}'", cases.scalar(flow.rate, m, c)
-            found.append(Case(what, rate, cases.rate(mode.name, o.name), mode.name, _OUTER))
+            formula, names = cases.rate(mode.name, o.name), cases.names_of_rate(mode.name, o.name)
+            found.append(Case(what, rate, formula, mode.name, _OUTER, names))
     found += [reset for k, surface in enumerate(ends) for reset in cases.reset(k, surface.name)]
     for k, surface in enumerate(ends):
         what, level = f"level of surface '{surface.name}'", cases.of_parameters(flow.level, k)
-        found.append(Case(what, level, cases.value(surface.level)))
-    return [*found, Case("period", cases.of_parameters(flow.period), cases.value(cases.period))]
+        found.append(
+            Case(what, level, cases.value(surface.level), names=cases.names(surface.level))
+        )
+    period = cases.of_parameters(flow.period), cases.value(cases.period)
+    return [*found, Case("period", *period, names=cases.names(cases.period))]
 
 
 @dataclass(eq=False)
@@ -252,6 +270,16 @@ class _Cases:
 
         return compiled
 
+    def names(self, *texts: str) -> frozenset[str] | None:
+        """Return the names that some expressions depend on; None where nothing is known."""
+        return None
+
+    def names_of_observable(self, name: str) -> frozenset[str] | None:
+        return None
+
+    def names_of_rate(self, mode: str, observable: str) -> frozenset[str] | None:
+        return None
+
     def observable(self, name: str) -> Formula:
         return list
 
@@ -285,6 +313,17 @@ class _Described(_Cases):
     def _field_at(self, mode: str, *point: Any) -> list[Any]:
         return self.exact.field(mode, *self._at(point))
 
+    def names(self, *texts: str) -> frozenset[str]:
+        return frozenset[str]().union(*map(self.description.names.leaves_of, texts))
+
+    def names_of_observable(self, name: str) -> frozenset[str]:
+        return self.names(self.exact.formula_of(name))
+
+    def names_of_rate(self, mode: str, observable: str) -> frozenset[str]:
+        own = self.names_of_observable(observable)
+        rates = zip(self.model.states, self.exact.rates_of(mode), strict=True)
+        return own | self.names(*(rate for state, rate in rates if state in own))
+
     def observable(self, name: str) -> Formula:
         return lambda point: [self.exact.observable(name, *self._at(point))]
 
@@ -305,7 +344,12 @@ class _Described(_Cases):
 
     def field(self, m: int, mode: str) -> list[Case]:
         compiled = self.vector(field_of(self.model), m)
-        return [Case(f"field of mode '{mode}'", compiled, lambda x: self._field_at(mode, *x), mode)]
+        names = self.names(*self.exact.rates_of(mode))
+        formula = partial(self._field_from, mode)
+        return [Case(f"field of mode '{mode}'", compiled, formula, mode, names=names)]
+
+    def _field_from(self, mode: str, point: list[Any]) -> list[Any]:
+        return self._field_at(mode, *point)
 
     def reset(self, k: int, surface: str) -> list[Case]:
         if surface not in self.description.resets:
@@ -316,7 +360,9 @@ class _Described(_Cases):
             at = self._at(point)
             return [self.exact.value(texts.get(s, s), *at) for s in self.model.states]
 
-        return [Case(f"reset at '{surface}'", self.vector(self.model.flow.reset, k), formula)]
+        compiled = self.vector(self.model.flow.reset, k)
+        names = self.names(*(texts.get(s, s) for s in self.model.states))
+        return [Case(f"reset at '{surface}'", compiled, formula, names=names)]
 
 
 def digits(description: Description) -> Evaluator[Any]:
@@ -324,11 +370,16 @@ def digits(description: Description) -> Evaluator[Any]:
     return Evaluator(description, MANY_DIGITS)
 
 
-def slopes(function: Any, point: list[Any], steps: Sequence[Any]) -> list[list[Any]]:
-    """Return the derivatives of a vector function by differences, one row a value; a step a variable."""
+def slopes(
+    function: Any, point: list[Any], steps: Sequence[Any], own: Sequence[int] | None = None
+) -> list[list[Any]]:
+    """Return the derivatives of a vector function by differences, one row a value; a step a variable.
+
+    ``own`` are those of the variables that it is differentiated by, all if left out.
+    """
     columns = []
-    for i, step in enumerate(steps):
-        ahead, behind = list(point), list(point)
+    for i in range(len(point)) if own is None else own:
+        ahead, behind, step = list(point), list(point), steps[i]
         ahead[i] += step
         behind[i] -= step
         up, down = function(ahead), function(behind)

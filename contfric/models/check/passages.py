@@ -105,8 +105,7 @@ def check_slides(report: ModelReport, probe: Probe) -> None:
 def _met(probe: Probe, domain: Domain, surface: str) -> str:
     """Return a place at which a slide comes to a surface, in words; "" if none is found."""
     own = tuple(name for name, side in domain.signs.items() if side == 0)
-    places = (probe.landed((*own, surface), *place) for place in probe.states(_DRAWN))
-    for t, y in islice((place for place in places if place is not None), _ASKED):
+    for t, y in islice(probe.on_all((*own, surface), _DRAWN), _ASKED):
         signs = probe.signs(t, y)
         others = {name: side for name, side in domain.signs.items() if side and name != surface}
         if any(signs[name] != side for name, side in others.items()):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -29,8 +29,14 @@ _FARTHER = 6
 _STILL = 2.0**-53
 #: On a surface: rounding of an observable of size 1.
 ON = 1e-12
+#: More states than are looked at anywhere.
+_MANY = 10**9
 #: Modes up to which each is looked at in as many states as one mode alone is.
 FEW_MODES = 9
+
+T = TypeVar("T")
+#: A time and a state.
+Place = tuple[float, FloatArray]
 
 
 def field_of(model: Model) -> Any:
@@ -141,34 +147,57 @@ class Probe:
         """Return the state after the reset at a surface."""
         return self.flow.reset(surface, t, y)
 
-    def states(self, count: int) -> Iterator[tuple[float, FloatArray]]:
+    def states(self, count: int) -> Iterator[Place]:
         """Yield times in one period and states in twice the region that starts are drawn from."""
-        draw = random.Random(self.seed)
+        for t, y in self._drawn.first(count):
+            yield t, y.copy()
+
+    @cached_property
+    def _drawn(self) -> Prefix[Place]:
+        """What is drawn, always the same."""
+        draw, period = random.Random(self.seed), self.period or 10.0
         region = np.column_stack(self.model.region(self.vector, 2.0)).tolist()
-        for _ in range(count):
-            t = draw.uniform(0.0, self.period or 10.0)
-            yield t, np.array([draw.uniform(*ends) for ends in region])
+        return Prefix(
+            (draw.uniform(0.0, period), np.array([draw.uniform(*ends) for ends in region]))
+            for _ in itertools.count()
+        )
 
-    def on(self, surface: str, count: int) -> Iterator[tuple[float, FloatArray]]:
-        """Yield times and states on a surface."""
-        for t, y in self.states(count):
-            landed = self.landed((surface,), t, y)
-            if landed is not None:
-                yield landed
+    def on(self, surface: str, count: int) -> Iterator[Place]:
+        """Yield times and states on a surface, near so many states."""
+        return self.on_all((surface,), count)
 
-    def places(
-        self, mode: str, drawn: int, most: int | None = None
-    ) -> Iterator[tuple[float, FloatArray]]:
+    def on_all(self, surfaces: tuple[str, ...], count: int) -> Iterator[Place]:
+        """Yield times and states on some surfaces, near so many states."""
+        return self._found(("surfaces", *surfaces), partial(self.landed, surfaces), count)
+
+    def _found(
+        self,
+        key: tuple[str, ...],
+        near: Callable[[float, FloatArray], Place | None],
+        count: int,
+    ) -> Iterator[Place]:
+        """Yield what is found near the first states; each is asked for once, whatever looks there again."""
+        if key not in self._known:
+            self._known[key] = Prefix(near(t, y) for t, y in self.states(_MANY))
+        for place in self._known[key].first(count):
+            if place is not None:
+                yield place[0], place[1].copy()
+
+    @cached_property
+    def _known(self) -> dict[tuple[str, ...], Prefix[Place | None]]:
+        return {}
+
+    def places(self, mode: str, drawn: int, most: int | None = None) -> Iterator[Place]:
         """Yield places of a mode, at most so many, near states of which so many are drawn."""
-        found = (self.inside(mode, t, y) for t, y in self.states(drawn))
-        yield from itertools.islice((place for place in found if place is not None), most)
+        found = self._found(("mode", mode), partial(self.inside, mode), drawn)
+        yield from itertools.islice(found, most)
 
     def shown(self, t: float, y: FloatArray) -> str:
         """Return a time and a state in words; no time where nothing depends on it."""
         values = ", ".join(f"{s} = {v:.6g}" for s, v in zip(self.model.states, y, strict=True))
         return values if self.model.autonomous else f"t = {t:.6g}, {values}"
 
-    def inside(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
+    def inside(self, mode: str, t: float, y: FloatArray) -> Place | None:
         """Return a state of a mode near a state: on the surfaces that it moves on; None if outside.
 
         None as well where a formula has no value, such as a root of a negative level.
@@ -176,7 +205,7 @@ class Probe:
         place = self.in_region(mode, t, y)
         return place if place is not None and self.is_defined(mode, *place) else None
 
-    def in_region(self, mode: str, t: float, y: FloatArray) -> tuple[float, FloatArray] | None:
+    def in_region(self, mode: str, t: float, y: FloatArray) -> Place | None:
         """Return a state of a mode near a state, whether its field has a value there or not."""
         on, _ = self._regions[mode]
         place = self.landed(on, t, y) if on else (t, y)
@@ -190,9 +219,7 @@ class Probe:
         observed = [self.flow.observe(name, t, y) for name in self.model.observable_index]
         return bool(np.all(np.isfinite(self.field(mode, t, y))) and np.all(np.isfinite(observed)))
 
-    def landed(
-        self, surfaces: tuple[str, ...], t: float, y: FloatArray
-    ) -> tuple[float, FloatArray] | None:
+    def landed(self, surfaces: tuple[str, ...], t: float, y: FloatArray) -> Place | None:
         """Return a time and state on some surfaces near others; the time moves only if it must."""
         point, last, farther = np.array([t, *y]), math.inf, 0
         for _ in range(_STEPS):
@@ -222,6 +249,21 @@ class Probe:
             above = values[surface.observable] - self._levels[surface.name]
             found[surface.name] = 0 if abs(above) <= ON else int(math.copysign(1, above))
         return {**found, **self.model.settled_sides}
+
+
+class Prefix(Generic[T]):
+    """The first elements of an endless iterator, each computed once."""
+
+    def __init__(self, elements: Iterator[T]) -> None:
+        self._elements = elements
+        self._known: list[T] = []
+
+    def first(self, count: int) -> Iterator[T]:
+        """Yield the first elements."""
+        for k in range(count):
+            if k == len(self._known):
+                self._known.append(next(self._elements))
+            yield self._known[k]
 
 
 def _shortest(slopes: FloatArray, heights: FloatArray) -> tuple[FloatArray, int]:

@@ -67,6 +67,14 @@ class Evaluator(Generic[T]):
             self._trees[text] = parse(text)
         return self._trees[text]
 
+    def formula_of(self, observable: str) -> str:
+        """Return the expression of an observable."""
+        return self._observable[observable]
+
+    def rates_of(self, mode: str) -> tuple[str, ...]:
+        """Return the expressions of the rates of all states in a mode."""
+        return self._fields[mode]
+
     def observable(self, name: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
         """Return the value of an observable."""
         return self.value(self._observable[name], params, t, y)

@@ -303,13 +303,33 @@ _CONTINUOUS = (
 )
 
 
+#: Those that are never steep where their arguments are not, and of these the ones without kinks.
+_GENTLE = (sympy.Add, sympy.Mul, Abs, sympy.sin, sympy.cos)
+_SMOOTH = (sympy.Add, sympy.Mul, sympy.sin, sympy.cos)
+
+
 def cannot_jump(expression: Any, moving: Collection[Any]) -> bool:
     """Tell whether a formula is continuous wherever ``moving`` are: all that depends on them is."""
-    if not expression.free_symbols & set(moving) or expression.is_Symbol:
+    return _made_of(_CONTINUOUS, expression, frozenset(moving))
+
+
+def is_gentle(expression: Any, moving: Collection[Any]) -> bool:
+    """Tell whether a formula neither jumps nor is as steep as a jump: polynomials, sines, sizes of them."""
+    return _made_of(_GENTLE, expression, frozenset(moving))
+
+
+def is_smooth(expression: Any, moving: Collection[Any]) -> bool:
+    """Tell whether the slopes of a formula are so, too: polynomials and sines."""
+    return _made_of(_SMOOTH, expression, frozenset(moving))
+
+
+def _made_of(functions: tuple[Any, ...], expression: Any, moving: frozenset[Any]) -> bool:
+    """Tell whether all of a formula that depends on ``moving`` is made of functions and whole powers."""
+    if not expression.free_symbols & moving or expression.is_Symbol:
         return True
     whole = expression.is_Pow and expression.exp.is_Integer and expression.exp > 0
-    known = whole or isinstance(expression, _CONTINUOUS)
-    return known and all(cannot_jump(part, moving) for part in expression.args)
+    known = whole or isinstance(expression, functions)
+    return known and all(_made_of(functions, part, moving) for part in expression.args)
 
 
 def may_have_kinks(expression: Any, moving: Collection[Any]) -> bool:
