@@ -229,7 +229,9 @@ class Rest:
                 break
             following = (k + 1) % len(itinerary)
             if following == i or is_hold(itinerary[following][1]):
-                raise NotationError(f"the rest of segment {i + 1} does not end in this turn")
+                raise NotationError(
+                    f"the rest of segment {i + 1} lasts while another contact is held, or for ever"
+                )
             self.departs.append(
                 departing_on(model, self.departs[-1], leaves, itinerary[following][0])
             )
