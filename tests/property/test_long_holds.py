@@ -14,8 +14,9 @@ from contfric.signature import parse_signature
 from contfric.signature.holds import is_hold
 from contfric.signature.reduced import canonical_itinerary, reduced_itinerary
 
-#: Scenes drawn (with the largest static over the kinetic limit) with a hold that two contacts pass.
-SEEDS = ((78, 6, 1.6), (79, 51, 2.6), (79, 39, 2.6))
+#: Scenes drawn (with the largest static over the kinetic limit) with holds that begin at a touch of rest (GS)
+#: or of the limit (AS), and go through two modes or three.
+SEEDS = ((78, 6, 1.6), (79, 51, 2.6), (79, 39, 2.6), (78, 33, 1.6), (79, 24, 2.6), (79, 58, 2.6))
 #: What a state may differ by from one that is simulated, and a load from its limit.
 MOTION = 1e-9
 NAMES = ("low", "high")
