@@ -132,3 +132,10 @@ def test_its_signature_is_read_back(seed: int) -> None:
         assert reduced_itinerary(again) == canonical_itinerary(orbit.itinerary, orbit.model)
         parts = sum(is_hold(exit_) for _, exit_ in orbit.itinerary)
         assert signature.holds == len(orbit.system.ends_of_holds) < parts
+
+
+@pytest.mark.parametrize("seed", [34])
+def test_one_is_proved(seed: int) -> None:
+    """In balls there is one such orbit near the printed one, and it obeys every inequality."""
+    orbit, _, _ = long_holds(drawn(seed))[1]
+    assert orbit.certify().proved
