@@ -176,7 +176,7 @@ class Assembly:
     @cached_property
     def lasting(self) -> list[tuple[int, str]]:
         """Segments that must last, and the surface that each is named by."""
-        return list(lasting_segments(self.itinerary, self.holds))
+        return lasting_segments(self.model, self.itinerary, self.joints, self.holds)
 
     @cached_property
     def tests(self) -> tuple[EventFunction, ...]:
@@ -192,7 +192,7 @@ class Assembly:
         )
 
     @cached_property
-    def leaving(self) -> list[tuple[int, int, int, int]]:
+    def leaving(self) -> list[tuple[int, ...]]:
         """Rows (segment, surface, side, mode) of the holds: what each leaves, to where, and in which mode."""
         model = self.model
         return [
@@ -209,7 +209,10 @@ class Assembly:
     def doubles(self) -> list[tuple[int, ...]]:
         """Rows (margin, segment) of those with a double zero where the segment has no length."""
         found = double_zeros(self.model, self.itinerary, self.half, self.holds)
-        return [(self.tests.index(test), i) for test, i in found if test in self.tests]
+        last = {i for i, _ in self.lasting}
+        return [
+            (self.tests.index(test), i) for test, i in found if test in self.tests and i in last
+        ]
 
     # ------------------------------------------------------------------------------------- labels
 

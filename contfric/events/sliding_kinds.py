@@ -23,6 +23,8 @@ entry      after a reset the state is on another  CS: another mode follows; GS w
            surface                                 turns back is mapped again
 lasting    slide between two holds                 GS: the first can be left no more
 lasting    last part of a hold in several modes    CS: it is left as another contact changes
+lasting    what begins as another contact changes,  CS: the hold begins as that does
+           up to the touch at which a hold begins
 any        of a segment that vanishes between two  as the exit by which it begins: AS of a slip, GS of a
            of one mode (:func:`beginning_of`)      stick
 =========  ======================================  ==========================================
@@ -37,6 +39,8 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.bvp.holds import Hold
+from contfric.bvp.margins import begun_by_another
+from contfric.bvp.segment_starts import joints_before
 from contfric.bvp.system import EventFunction, Margin, System
 from contfric.events.bifurcation import Kind
 from contfric.events.local.jumps import nothing_jumps
@@ -75,6 +79,8 @@ def kind_of_margin(system: System, test: EventFunction, orbit: Orbit) -> Kind:
     hold = hold_of_test(test, orbit)
     if hold is not None:
         return kind_of_hold(hold, test, orbit)
+    if test.margin is Margin.LASTING and _begins_with_another(system, test.segment):
+        return Kind.CS
     if chosen_at(system, test):
         return Kind.SS
     if test.margin is Margin.ENTRY:
@@ -134,6 +140,16 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
     return None
 
 
+def _begins_with_another(system: System, i: int) -> bool:
+    """Tell whether a segment up to the touch at which a hold begins starts as another contact changes."""
+    joints = joints_before(system.model, system.itinerary, system.half)
+    return any(
+        hold.segment == i + 1
+        and begun_by_another(system.model, system.itinerary, joints, i, hold.leaves)
+        for hold in system.holds
+    )
+
+
 def kind_of_hold(hold: Hold, test: EventFunction, orbit: Orbit) -> Kind:
     """Return the event that an end of a hold's freedom is: that which the hold is pinned to.
 
@@ -141,10 +157,12 @@ def kind_of_hold(hold: Hold, test: EventFunction, orbit: Orbit) -> Kind:
     changes its state as the hold ends it is CS; where that contact's surface is touched, as in other rests.
     """
     model, mode = orbit.model, orbit.system.itinerary[hold.segment][0]
-    if test.segment == hold.segment and test.margin is not Margin.HELD:
+    if test.segment == hold.segment:
         short = bool(orbit.durations[hold.segment] < _VANISHED * orbit.period)
         met = test.surface != hold.leaves and of_another(model, mode, test.surface, hold.leaves)
-        if (met and test.margin is Margin.JOINT) or (short and hold.follows and hold.until is None):
+        if (met and test.margin is Margin.JOINT) or (
+            short and hold.follows != (hold.until is not None)
+        ):
             return Kind.CS
         if met:
             return _kind_of_touch(model, mode, test.surface)

@@ -226,7 +226,8 @@ def _long_hold(model: Model, segments: tuple[str, ...]) -> tuple[str, tuple[str,
     for rest, departs in dict.fromkeys(ways):
         if departs is None or not model.mode_by_name[rest].sliding:
             continue
-        leaves, chains = left_surface(model, rest, departs), [((rest,), departs)]
+        leaves = left_surface(model, rest, departs)
+        chains: list[tuple[tuple[str, ...], str]] = [((rest,), departs)]
         if model.lies_on(departs, leaves):
             continue
         for hold in further:

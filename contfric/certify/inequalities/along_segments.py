@@ -251,7 +251,7 @@ def _held(
     """Return that a hold could be left at any time: the acceleration that it would be left with."""
     for hold in system.holds:
         if hold.segment == i:
-            sign = int(system.layout.exit_signs[i])
+            sign = next(int(side) for at, _, side, _ in system.layout.held if at == i)
             row = chain.model.rate(hold.leaves, hold.departs)
             order = order_at_start(chain.model, row, chain.segments.modes[i], zeros)
             if touch and touch.after is not None and _departs(touch, i):

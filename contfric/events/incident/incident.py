@@ -318,7 +318,7 @@ def _vanished(orbit: Orbit) -> Iterator[EventFunction]:
     """
     lasts = orbit.durations
     for hold in orbit.system.holds:
-        touches = hold.pin is None and not hold.after_rest
+        touches = hold.pin is None and not hold.after_rest and hold.until is None
         if touches and lasts[hold.segment] < NO_LENGTH_AT_TOUCH * time_unit(orbit):
             yield EventFunction(Margin.EXIT, hold.segment, hold.leaves)
 

@@ -90,6 +90,21 @@ def _held_in(model: Model, mode: str, surface: str, hold: Hold, after: str) -> s
     raise NotationError(f"no rest after '{mode}' at {surface} is left into '{after}'")
 
 
+def shortened(orbit: Orbit, hold: Hold) -> tuple[Edit, Joints, str]:
+    """Return the edit where a part of a hold in several modes has no length.
+
+    Raises
+    ------
+    NotationError
+        If it is not the first or the last one: two other contacts change at once.
+    """
+    if hold.until is None:
+        return ends_earlier(orbit, hold.segment)
+    if not hold.follows:
+        return begins_later(orbit, (hold.segment - 1) % len(orbit.itinerary))
+    raise NotationError(f"{hold.pin} and {hold.until} are met at once in hold {hold.segment + 1}")
+
+
 def ends_earlier(orbit: Orbit, h: int) -> tuple[Edit, Joints, str]:
     """Return the edit where the last part of a hold has no length: a slide up to the same surface."""
     before, surface = hold_in(orbit, h - 1), str(pinned_surface(orbit.itinerary[h][1]))
@@ -229,7 +244,9 @@ class Rest:
                 break
             following = (k + 1) % len(itinerary)
             if following == i or is_hold(itinerary[following][1]):
-                raise NotationError(f"the rest of segment {i + 1} does not end in this turn")
+                raise NotationError(
+                    f"the rest of segment {i + 1} lasts while another contact is held, or for ever"
+                )
             self.departs.append(
                 departing_on(model, self.departs[-1], leaves, itinerary[following][0])
             )

@@ -321,10 +321,8 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not hold.after_rest else NO_LENGTH
     if orbit.durations[h] < no_length * time_unit(orbit) and vanishes_with(orbit, location):
-        if hold.until is not None:
-            raise NotationError(f"hold {h + 1} has no length, and goes on as {hold.until} is met")
-        if hold.follows:
-            return Successor(*long_holds.ends_earlier(orbit, h))
+        if hold.follows or hold.until is not None:
+            return Successor(*long_holds.shortened(orbit, hold))
         reason = f"hold {h + 1} vanishes"
         if at_touch and not hold.after_rest:  # the slide goes on
             return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
