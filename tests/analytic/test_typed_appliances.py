@@ -266,3 +266,22 @@ def test_a_rotor_rubs(tmp_path: Path) -> None:
     t, *y = orbit.begins[0]
     run = solve_ivp(field, (t, t + orbit.period), y, rtol=1e-11, atol=1e-12, method="DOP853")
     assert run.y[:, -1] == pytest.approx(y, abs=1e-8)
+
+
+def test_impacts_that_lose_ever_less_are_told(tmp_path: Path) -> None:
+    """Restitution exp(-v/vc): speeds go down like 1/n, and so do the flights."""
+    model = typed(
+        tmp_path,
+        """
+name: ball
+states: [x, v]
+parameters: {A: 0.5, g: 1.0, vc: 2.0}
+period: 2*pi
+define: {rel: v - A*cos(t), e: exp(-abs(rel)/vc)}
+surfaces: {table: {observable: x - A*sin(t)}}
+modes: {flight: {in: {table: +}, field: {x: v, v: -g}}}
+resets: {table: {v: A*cos(t) - e*rel}}
+""",
+    )
+    with pytest.raises(cf.ConvergenceError, match="whose restitution comes to 1"):
+        cf.find_orbit(model)
