@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 import contfric as cf
@@ -266,3 +267,148 @@ def test_a_rotor_rubs(tmp_path: Path) -> None:
     t, *y = orbit.begins[0]
     run = solve_ivp(field, (t, t + orbit.period), y, rtol=1e-11, atol=1e-12, method="DOP853")
     assert run.y[:, -1] == pytest.approx(y, abs=1e-8)
+
+
+def test_impacts_that_lose_ever_less_are_told(tmp_path: Path) -> None:
+    """Restitution exp(-v/vc): speeds go down like 1/n, and so do the flights."""
+    model = typed(
+        tmp_path,
+        """
+name: ball
+states: [x, v]
+parameters: {A: 0.5, g: 1.0, vc: 2.0}
+period: 2*pi
+define: {rel: v - A*cos(t), e: exp(-abs(rel)/vc)}
+surfaces: {table: {observable: x - A*sin(t)}}
+modes: {flight: {in: {table: +}, field: {x: v, v: -g}}}
+resets: {table: {v: A*cos(t) - e*rel}}
+""",
+    )
+    with pytest.raises(cf.ConvergenceError, match="whose restitution comes to 1"):
+        cf.find_orbit(model)
+
+
+#: A heater that is on for a share of each period, which a controller sets at the tick, between two limits.
+SAMPLED = """
+name: sampled
+states: [x, q, d]
+parameters: {a: 1.0, K: 3.0, r: 1.0, kp: 0.8, ki: 0.5, Ts: 0.5}
+period: Ts
+define: {u: kp*(r - x) + ki*q}
+observables: {wanted: u}
+surfaces:
+  off: {observable: "mod(t, Ts) - d*Ts"}
+  full: {observable: wanted, level: 0.98}
+  least: {observable: wanted, level: 0.02}
+field: {x: -a*x, q: r - x, d: 0}
+modes:
+  on: {in: {off: -}, field: {x: -a*x + K, q: r - x, d: 0}}
+MODES
+resets: {tick: {d: "max(0.02, min(0.98, u))", to: on}}
+spread: {x: [0, 3], q: [-1, 1], d: [0, 1]}
+"""
+LIMITS = """  more: {in: {off: +, full: +}}
+  rest: {in: {off: +, full: -, least: +}}
+  less: {in: {off: +, least: -}}
+"""
+
+
+def after_a_tick(z: np.ndarray, d: float, p: dict[str, float]) -> np.ndarray:
+    """Return temperature and integral a period later, in closed form."""
+    (x, q), a, K = z, p["a"], p["K"]
+    on, rest = d * p["Ts"], (1.0 - d) * p["Ts"]
+    warm = K / a + (x - K / a) * np.exp(-a * on)
+    q += p["r"] * on - K / a * on - (x - K / a) * (1.0 - np.exp(-a * on)) / a
+    return np.array(
+        [warm * np.exp(-a * rest), q + p["r"] * rest - warm * (1.0 - np.exp(-a * rest)) / a]
+    )
+
+
+def test_a_limit_inside_of_another_one_is_a_corner_of_a_reset(tmp_path: Path) -> None:
+    """``max(a, min(b, u))``: both limits are surfaces with a mode on each side: no branch stalls."""
+    model = typed(tmp_path, SAMPLED.replace("MODES\n", LIMITS))
+    assert "has a kink" not in str(cf.check_model(model))
+    diagram = cf.explore(cf.find_orbit(model), "kp", (0.8, 1.5))
+    assert not diagram.loose_ends
+    p = model.defaults
+
+    def wanted(z: np.ndarray, kp: float) -> float:
+        return float(kp * (p["r"] - z[0]) + p["ki"] * z[1])
+
+    def doubling(z: np.ndarray) -> list[float]:
+        at, kp = z[:2], z[2]
+        columns = [
+            after_a_tick(at + e, wanted(at + e, kp), p)
+            - after_a_tick(at - e, wanted(at - e, kp), p)
+            for e in 1e-5 * np.eye(2)
+        ]
+        slopes = np.array(columns).T / 2e-5
+        closing = after_a_tick(at, wanted(at, kp), p) - at
+        return [*closing, float(np.linalg.det(slopes + np.eye(2)))]
+
+    def corner(z: np.ndarray) -> list[float]:
+        at, kp = z[:2], z[2]
+        between = after_a_tick(at, 0.02, p)
+        return [*(after_a_tick(between, wanted(between, kp), p) - at), wanted(at, kp) - 0.02]
+
+    found = {
+        kind: [b.params["kp"] for b in diagram.bifurcations if b.kind is kind]
+        for kind in (cf.Kind.PD, cf.Kind.CS)
+    }
+    [pd] = found[cf.Kind.PD]
+    assert pd == pytest.approx(fsolve(doubling, [0.84, 0.4, 1.43], xtol=1e-8)[2], abs=1e-6)
+    reference = fsolve(corner, [1.12, 0.37, 1.43], xtol=1e-12)[2]
+    assert min(abs(kp - reference) for kp in found[cf.Kind.CS]) < 1e-9
+
+
+def test_domains_of_one_mode_do_not_hide_a_kink_of_a_reset(tmp_path: Path) -> None:
+    """Solutions cross such surfaces without an event; without a mode on each side the kink is told."""
+    model = typed(tmp_path, SAMPLED.replace("MODES\n", "  rest: {in: {off: +}}\n"))
+    report = str(cf.check_model(model))
+    assert "the reset at 'tick' has a kink where ki*q + kp*(r - x) - 1/50 = 0" in report
+    assert "a mode on each side" in report
+
+
+#: An LLC converter with a fixed output: where no diode conducts, both currents are equal (a slide).
+LLC = """
+name: llc
+states: [ir, im, vc]
+parameters: {V: 1.0, Vo: 0.9, Lr: 1.0, Lm: 4.0, Cr: 1.0, w: 0.7}
+period: 2*pi/w
+surfaces:
+  bridge: {observable: sin(w*t)}
+  diode: {observable: ir - im, sliding: filippov}
+field:
+  ir: (V*sign(sin(w*t)) - vc - Vo*sign(ir - im))/Lr
+  im: Vo*sign(ir - im)/Lm
+  vc: ir/Cr
+symmetry: ir -> -ir, im -> -im, vc -> -vc, t -> t + T/2
+"""
+
+
+def test_a_converter_without_loss_ends_at_its_resonance(tmp_path: Path) -> None:
+    """Its branch stalls at w = 1 with currents of 3e5; that is no fold. An orbit by expm at w = 0.7."""
+    model = typed(tmp_path, LLC)
+    orbit = cf.find_orbit(model)
+    p = model.defaults
+
+    def moved(t: float, y: np.ndarray, duration: float, slides: bool, sense: float) -> np.ndarray:
+        drive = p["V"] * np.sign(np.sin(p["w"] * (t + 0.5 * duration)))
+        if slides:  # one current through both coils
+            A = np.array([[0.0, 0.0, -1.0 / (p["Lr"] + p["Lm"])]] * 2 + [[1.0 / p["Cr"], 0.0, 0.0]])
+            b = np.array([drive / (p["Lr"] + p["Lm"])] * 2 + [0.0])
+        else:
+            A = np.array([[0.0, 0.0, -1.0 / p["Lr"]], [0.0] * 3, [1.0 / p["Cr"], 0.0, 0.0]])
+            b = np.array([(drive - sense * p["Vo"]) / p["Lr"], sense * p["Vo"] / p["Lm"], 0.0])
+        whole = np.zeros((4, 4))
+        whole[:3, :3], whole[:3, 3] = A, b
+        return np.asarray((expm(whole * duration) @ [*y, 1.0])[:3])
+
+    for (mode, _), begin, end in zip(orbit.itinerary, orbit.begins, orbit.ends, strict=True):
+        duration = (end[0] - begin[0]) % orbit.period
+        slides, sense = mode.startswith("slide"), 1.0 if "diode+" in mode else -1.0
+        assert moved(begin[0], begin[1:], duration, slides, sense) == pytest.approx(
+            end[1:], abs=1e-9
+        )
+    last = cf.continue_orbit(orbit, "w", (0.65, 1.2)).ends[1]
+    assert last.reason is cf.EndReason.UNBOUNDED

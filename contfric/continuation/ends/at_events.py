@@ -54,6 +54,8 @@ _SAME = 1e-4
 #: A parameter that changes by less than this share of the range over hundreds of points, while states are
 #: this large and grow by this factor, comes to a resonance.
 _AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
+#: States of a side that stalls at a resonance, and the share of the range over which they have doubled.
+_HUGE, _STANDS = 1e4, 1e-5
 
 
 def is_point(orbit: Orbit) -> bool:
@@ -304,6 +306,15 @@ def grows(side: Side, settings: Settings) -> bool:
         return False
     before, now = (float(np.abs(side.rows.joints[k, :, 1:]).max()) for k in (0, last))
     return now > _LARGE and now > _GROWS * before
+
+
+def has_grown(side: Side, settings: Settings) -> bool:
+    """Tell whether a side stalls at a resonance: large, and over its last doubling at one value."""
+    sizes = np.abs(side.rows.joints[: side.last + 1, :, 1:]).max(axis=(1, 2))
+    half = np.flatnonzero(sizes <= 0.5 * sizes[-1])
+    if not len(half) or sizes[-1] < _HUGE:
+        return False
+    return bool(np.ptp(side.rows.w[half[-1] : side.last + 1, 0]) < _STANDS * settings.width)
 
 
 def lost_in_end(event: Bifurcation, end: Orbit, parameter: str, width: float) -> bool:

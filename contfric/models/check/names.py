@@ -121,7 +121,7 @@ def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
         return
     from sympy import Symbol, lambdify
 
-    from contfric.models.language.formulas import kinks_in
+    from contfric.models.language.formulas import branches_of, kinks_in
 
     symbols = (formulas.t, *formulas.y, *formulas.p)
     names = dict(zip(symbols, ("t", *model.states, *model.parameter_names), strict=True))
@@ -134,14 +134,20 @@ def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
             report.count(Topic.KINKS)
             value, signs = lambdify(symbols, kink, [_KINKED, "math"]), set()
             for domain, t, y in met:
-                signs.add((domain.name, float(value(t, *y, *probe.vector)) > 0.0))
+                signs.add((domain.own_mode, float(value(t, *y, *probe.vector)) > 0.0))
             if len({name for name, _ in signs}) == len(signs):
                 continue
-            text = kink.subs({s: Symbol(name) for s, name in names.items()})
+            parts = {
+                part.subs({s: Symbol(n) for s, n in names.items()}) for part in branches_of(kink)
+            }
+            moving = {"t", *model.states}
+            text = " = 0 or ".join(
+                sorted(str(p) for p in parts if moving & set(map(str, p.free_symbols)))
+            )
             report.warn(
                 Topic.KINKS,
                 f"the reset at '{reset.surface}' has a kink where {text} = 0: multipliers jump there, and no "
-                "event says so, nor what branches off",
+                "event says so, nor what branches off. Add a surface there, and a mode on each side",
             )
 
 

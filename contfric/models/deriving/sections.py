@@ -224,11 +224,12 @@ def _kinks_of_resets(description: Description) -> set[str]:
     if not has_kinks(description, texts):
         return set()
     from contfric.models.generated.symbols import Formulas
-    from contfric.models.language.formulas import kinks_in, vanishes
+    from contfric.models.language.formulas import branches_of, kinks_in, vanishes
 
     formulas = Formulas(description)
     images = [value for image in formulas.resets() for value in image]
-    kinks = {k for value in images for k in kinks_in(value, (formulas.t, *formulas.y))}
+    found = {k for value in images for k in kinks_in(value, (formulas.t, *formulas.y))}
+    kinks = {part for kink in found for part in branches_of(kink)}
     return {
         name
         for name, height in formulas.heights().items()

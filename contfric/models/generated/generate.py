@@ -23,6 +23,7 @@ from contfric.models.generated.linear_code import (
 )
 from contfric.models.generated.motion import motion_code
 from contfric.models.generated.symbols import Formulas, moves_in_closed_form
+from contfric.models.language.derivatives import derivative
 from contfric.models.language.formulas import vanishes
 
 _HEAD = '''"""Compiled functions of a model, generated from its definition; not to be edited.
@@ -164,11 +165,12 @@ class _Writer:
             found = [Output(VALUES, f"{target}[{i}]", e) for i, e in enumerate(row)]
             for i, e in enumerate(row):
                 found += [
-                    Output(SLOPES, f"jac[{i}, {m}]", e.diff(s))
+                    Output(SLOPES, f"jac[{i}, {m}]", derivative(e, s))
                     for m, s in enumerate((self.f.t, *self.f.y))
                 ]
                 found += [
-                    Output(k, f"jac[{i}, {1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)
+                    Output(k, f"jac[{i}, {1 + n} + j]", derivative(e, s))
+                    for k, s in enumerate(self.f.p)
                 ]
             return _without_idle(found)
 
@@ -190,9 +192,10 @@ class _Writer:
         n = len(self.f.y)
         found = [Output(VALUES, "value", e)]
         found += [
-            Output(SLOPES, f"grad[{m}]", e.diff(s)) for m, s in enumerate((self.f.t, *self.f.y))
+            Output(SLOPES, f"grad[{m}]", derivative(e, s))
+            for m, s in enumerate((self.f.t, *self.f.y))
         ]
-        found += [Output(k, f"grad[{1 + n} + j]", e.diff(s)) for k, s in enumerate(self.f.p)]
+        found += [Output(k, f"grad[{1 + n} + j]", derivative(e, s)) for k, s in enumerate(self.f.p)]
         return _without_idle(found)
 
     def of_parameters(self, head: str, index: str | None, values: list[Any]) -> None:
@@ -201,7 +204,7 @@ class _Writer:
             _without_idle(
                 [
                     Output(VALUES, "value", e),
-                    *(Output(k, "grad[j]", e.diff(s)) for k, s in enumerate(self.f.p)),
+                    *(Output(k, "grad[j]", derivative(e, s)) for k, s in enumerate(self.f.p)),
                 ]
             )
             for e in values

@@ -15,6 +15,7 @@ import sympy
 
 from contfric.models.generated.affine import AffineForm
 from contfric.models.generated.code import VALUES, Lines, Output, write_block
+from contfric.models.language.derivatives import derivative
 
 #: Coefficients that are taken out of their array before a loop: more would not stay in registers.
 _FEW = 24
@@ -126,7 +127,7 @@ class LinearWriter:
         for vector in vectors:
             block = [Output(VALUES, f"out[{i}]", e) for i, e in enumerate(vector)]
             for k, symbol in enumerate(self.parameters):
-                slopes = [(i, e.diff(symbol)) for i, e in enumerate(vector)]
+                slopes = [(i, derivative(e, symbol)) for i, e in enumerate(vector)]
                 block += [Output(k, f"jac[j, {i}]", e) for i, e in slopes if e != 0]
             blocks.append(tuple(block))
 

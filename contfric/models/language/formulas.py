@@ -32,6 +32,8 @@ _EXACT_POWER = 64
 _LARGEST = sys.float_info.max
 #: Places at which a formula is evaluated before it is simplified; digits there, and what may be rounding.
 _TRIED, _DIGITS, _ROUNDING = 2, 30, 1e-15
+#: Kinks inside of another one that are taken apart.
+_NESTED = 6
 #: Base at which a slope of a power is taken where the base is 0 and the slope may be infinite: what rounding
 #: makes of the 0 of a base of size 1. A factor that vanishes there, as in ``abs(v)*abs(v)**0.9``, makes a
 #: product of 0, which is its limit, and not ``0*inf``.
@@ -266,6 +268,21 @@ def kinks_in(expression: Any, moving: Collection[Any]) -> list[Any]:
         sign: sympy.Integer(1) for sign in expression.atoms(Sign)
     }  # where only these change, they are parts
     return sorted({x for x in parts if x.xreplace(signs).free_symbols & set(moving)}, key=str)
+
+
+def branches_of(kink: Any) -> set[Any]:
+    """Return what a formula is on the sides of the kinks inside of it: of ``min(x, 1) - c`` two.
+
+    Examples
+    --------
+    >>> x = sympy.Symbol("x")
+    >>> sorted(map(str, branches_of(Where(x - 1, 1, x) - 2)))
+    ['-1', 'x - 2']
+    """
+    inner = sorted(kink.atoms(Abs, Sign, Where), key=str)
+    if not inner or len(inner) > _NESTED:
+        return {kink}
+    return {p for part in _either(inner[0]) for p in branches_of(kink.xreplace({inner[0]: part}))}
 
 
 def _bending(expression: Any) -> set[Any]:

@@ -33,8 +33,8 @@ from contfric.orbit.finding.rest import (
     comes_to_rest,
     is_point,
     quickens,
-    slides_of_order_two,
     winds,
+    without_an_end,
 )
 from contfric.orbit.finding.sizes import warn_of_sizes
 from contfric.orbit.orbit import Orbit
@@ -191,7 +191,7 @@ class _Search:
         if winds(trajectory):
             raise ConvergenceError(comes_to_rest(trajectory), trajectory)
         if quickens(trajectory, self.model.view(self.model.vector(self.params)).period):
-            raise ConvergenceError(slides_of_order_two(trajectory), trajectory)
+            raise ConvergenceError(without_an_end(trajectory), trajectory)
         return self._simulated(_MOST_EVENTS_AT_ONCE)
 
     def _simulated(self, events: int) -> Trajectory:

@@ -99,15 +99,21 @@ def quickens(trajectory: Trajectory, period: float) -> bool:
     return bool(within and lately < _QUICKER * before and ends[1] < _SHRINKS * ends[0])
 
 
-def slides_of_order_two(trajectory: Trajectory) -> str:
-    """Return what is said of a solution that switches without an end at a place that moves."""
+def without_an_end(trajectory: Trajectory) -> str:
+    """Return what is said of a solution that switches, or strikes, without an end at a place that moves."""
     met = sorted({surface for _, surface in trajectory.itinerary_from(-len(trajectory) // 4)})
     where = " and ".join(f"'{name}'" for name in met)
+    near = _place(trajectory.model, trajectory.states[-1])
+    if any(reset.surface in met for reset in trajectory.model.resets):
+        return (
+            f"no periodic orbit: resets at {where} follow each other faster and faster without an end, near "
+            f"{near}: like 1/n, as impacts whose restitution comes to 1 at low speeds. Bound it below 1, and "
+            "they come to rest"
+        )
     return (
-        f"no periodic orbit: the solution switches at {where} faster and faster without an end, near "
-        f"{_place(trajectory.model, trajectory.states[-1])}: its rate comes to 0 with it, "
-        "and no mode slides there. Leave out what delays the switch (the lag of an actuator), so that "
-        "'sliding: filippov' has its place, or switch with hysteresis"
+        f"no periodic orbit: the solution switches at {where} faster and faster without an end, near {near}: "
+        "its rate comes to 0 with it, and no mode slides there. Leave out what delays the switch (the lag of "
+        "an actuator), so that 'sliding: filippov' has its place, or switch with hysteresis"
     )
 
 
