@@ -161,7 +161,10 @@ def inequalities(
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros, touch)
-    for found in (*_at_joints(chain, system, joints, surfaces, shown), *_exits(chain, system, joints)):
+    for found in (
+        *_at_joints(chain, system, joints, surfaces, shown),
+        *_exits(chain, system, joints),
+    ):
         at_event = list(more.get(found.segment, []))  # rows that vanish because it is one
         at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
         if found.what == JOINT and in_span(model.rows[found.surface], at_event):
