@@ -186,7 +186,7 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
             [*joints, *image],
             [
                 *known,
-                *([_image(r, closing, segments, model, modes) for r in rows] for rows in known),
+                *(_images(rows, closing, segments, model, modes) for rows in known),
             ],
         )
         turn = 2 * turn
@@ -194,15 +194,22 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     return _Cycle(joints, all_modes, all_resets, known, turn, orbit.periods)
 
 
-def _image(
-    row: Vector, closing: Closing, segments: Segments, model: BallModel, modes: list[list[str]]
-) -> Vector:
-    """Return the image of a row; of a rate that of the image of its surface, as balls do not show it."""
-    rate, images = model.rate_that_is(row), dict(segments.images)
-    of = dict(zip(*modes, strict=True))
-    if rate is not None and rate[0] in images and rate[1] in of:
-        return model.rate(images[rate[0]], of[rate[1]], rate[2])
-    return closed(row, closing, segments, model)
+def _images(
+    rows: list[Vector],
+    closing: Closing,
+    segments: Segments,
+    model: BallModel,
+    modes: list[list[str]],
+) -> list[Vector]:
+    """Return the images of rows; of a rate also that of the image of its surface, as balls do not show it."""
+    found = [closed(row, closing, segments, model) for row in rows]
+    images, of = dict(segments.images), dict(zip(*modes, strict=True))
+    rates = [rate for rate in map(model.rate_that_is, rows) if rate is not None]
+    return found + [
+        model.rate(images[name], of[mode], order)
+        for name, mode, order in rates
+        if name in images and mode in of
+    ]
 
 
 def _left(
