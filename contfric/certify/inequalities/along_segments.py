@@ -115,6 +115,7 @@ def inequalities(
     more = rows_met(met, segments, model)
     known = zeros_at_joints(segments, model, closing, more, still)
     surfaces = [s.name for s in system.model.surfaces]
+    shown = set[tuple[int, str, int]]()  # at joints, by what holds up to the end or from the start
     for i in range(segments.count) if only is None else sorted(only):
         move = chain.move(i, joints)
         duration = joints[i + 1][0] - joints[i][0]
@@ -153,10 +154,17 @@ def inequalities(
                 bends = InequalityName(i, surface, EXIT) in loose
                 rises = order < 2 and InequalityName(i, surface, (ENTRY, RATE)[order]) in loose
                 finding = positive(path, row, order, ends, bends, rises)
+                if finding.proved and not ends:
+                    shown.add((i, surface, sign))
+            if finding.proved and not order and i and not segments.resets[i]:
+                shown.add((i - 1, surface, sign))
             window = partial(undecided, path, row, order, ends)
             yield Inequality(i, surface, INSIDE, finding, window)
         yield from _held(chain, system, i, path, zeros, touch)
-    for found in (*_at_joints(chain, system, joints, surfaces), *_exits(chain, system, joints)):
+    for found in (
+        *_at_joints(chain, system, joints, surfaces, shown),
+        *_exits(chain, system, joints),
+    ):
         at_event = list(more.get(found.segment, []))  # rows that vanish because it is one
         at_event += known[still] if still >= 0 and found.segment in (still - 1, still) else []
         if found.what == JOINT and in_span(model.rows[found.surface], at_event):
@@ -277,10 +285,16 @@ def _inside(system: System, i: int, surfaces: list[str]) -> list[tuple[str, int]
 
 
 def _at_joints(
-    chain: Chain, system: System, joints: list[Vector], surfaces: list[str]
+    chain: Chain,
+    system: System,
+    joints: list[Vector],
+    surfaces: list[str],
+    shown: set[tuple[int, str, int]],
 ) -> Iterator[Inequality]:
     model = chain.model
     for i, k, sign, where in system.layout.joint:
+        if where == 0 and (int(i), surfaces[k], int(sign)) in shown:
+            continue
         if where == 1:  # after a reset
             state = chain.move(int(i), joints).start
         else:

@@ -260,7 +260,9 @@ def ends_inside(edge: Edge, box: Box) -> tuple[InequalityName, ...]:
     """Return the inequalities that end the branch at one orbit of a box; none if that is not proved."""
     if box.tangent is None:
         return ()
-    loose = [found.name for found in _failing(edge, box.all, ()) if found.name.what in NUMBERS]
+    loose = [found.name for found in _failing(edge, box.all, ()) if found.name.what == DURATION]
+    # what such a segment shows of its ends as long as it lasts need not fall by itself
+    loose += [found.name for found in _failing(edge, box.all, loose) if found.name.what in NUMBERS]
     left = _failing(edge, box.all, loose)
     rates = [found.name._replace(what=RATE) for found in left if found.what == INSIDE]
     if rates:

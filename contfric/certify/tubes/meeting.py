@@ -21,7 +21,7 @@ from contfric.certify.equations.closing import closing_of
 from contfric.certify.equations.extended import Builder
 from contfric.certify.equations.kept import Kept
 from contfric.certify.equations.short_slide import ShortSlide
-from contfric.certify.equations.zeros import at_start, closed, in_span, zeros_at_joints
+from contfric.certify.equations.zeros import Closing, at_start, closed, in_span, zeros_at_joints
 from contfric.certify.events import EventCertificate
 from contfric.certify.inequalities.along_segments import rows_met
 from contfric.models.balls.build import ball_model
@@ -186,12 +186,30 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
             [*joints, *image],
             [
                 *known,
-                *([closed(r, closing, segments, model) for r in rows] for rows in known),
+                *(_images(rows, closing, segments, model, modes) for rows in known),
             ],
         )
         turn = 2 * turn
     all_modes, all_resets = list(chain.from_iterable(modes)), list(chain.from_iterable(resets))
     return _Cycle(joints, all_modes, all_resets, known, turn, orbit.periods)
+
+
+def _images(
+    rows: list[Vector],
+    closing: Closing,
+    segments: Segments,
+    model: BallModel,
+    modes: list[list[str]],
+) -> list[Vector]:
+    """Return the images of rows; of a rate also that of the image of its surface, as balls do not show it."""
+    found = [closed(row, closing, segments, model) for row in rows]
+    images, of = dict(segments.images), dict(zip(*modes, strict=True))
+    rates = [rate for rate in map(model.rate_that_is, rows) if rate is not None]
+    return found + [
+        model.rate(images[name], of[mode], order)
+        for name, mode, order in rates
+        if name in images and mode in of
+    ]
 
 
 def _left(
@@ -292,10 +310,10 @@ def _leads(
 ) -> bool:
     """Tell whether the orbit obeys the equations of segment i of the branch."""
     j, later = start
-    following = ((j + 1) % len(cycle.joints), later + (j + 1) // len(cycle.joints))
     resets = cycle.resets[j], segments.resets[i]
     own = cycle.modes[j] == segments.modes[i] and _act_alike(model, resets, cycle.vanishing[j])
-    if not ((start == end and not segments.resets[i]) or (end == following and own)):
+    own = own and end in _reached(cycle, j, later)
+    if not ((start == end and not segments.resets[i]) or own):
         return False
     pin = segments.pins[i]
     if pin is None:
@@ -303,6 +321,16 @@ def _leads(
     if isinstance(pin, str):
         return in_span(model.rows[pin], cycle.vanishing[j])
     return in_span(model.rate(pin[1], pin[0]), cycle.vanishing[j])
+
+
+def _reached(cycle: _Cycle, j: int, later: int) -> Iterator[tuple[int, int]]:
+    """Yield the joints that the orbit comes to from one in the same mode: the next, and others beyond it."""
+    count = len(cycle.joints)
+    for k in range(j + 1, j + count + 1):
+        at = k % count
+        yield at, later + k // count
+        if cycle.modes[at] != cycle.modes[j] or cycle.resets[at]:
+            return
 
 
 def _act_alike(model: BallModel, resets: tuple[str, str], vanishing: list[Vector]) -> bool:

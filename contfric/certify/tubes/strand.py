@@ -35,7 +35,7 @@ from contfric.orbit.orbit import Orbit
 
 #: Shortest step that is halved, as a share of the branch; events at its ends are as near to them and nearer.
 _SHORTEST, _AT_END = 1e-5, 1e-8
-#: Points nearer than this to a limit of the parameter are no ends of boxes, as a share of the branch.
+#: Points nearer than this to an event or a limit at an end are no ends of boxes, as a share of the branch.
 _NEAR = 1e-4
 #: How far the box of a PD or BP may reach, as a share of the branch.
 _FAR = 0.1
@@ -182,12 +182,15 @@ class Strand:
         return self.branch.ends[end].reason is EndReason.LIMIT
 
     def after(self, k: int) -> int:
-        """Return the next point, or the one after those that are very near to a limit of the parameter."""
+        """Return the next point, or the one after those that are very near to an event or a limit at an end.
+
+        Boxes next to them would reach beyond it.
+        """
         arc = self.branch.arc
         near, last = _NEAR * float(arc[-1] - arc[0]), len(arc) - 1
-        if k == 0 and self.is_limit(0):
+        if k == 0 and self.has_edge(0):
             return next((j for j in range(1, last) if arc[j] - arc[0] > near), last)
-        return last if self.is_limit(-1) and arc[-1] - arc[k + 1] < near else k + 1
+        return last if self.has_edge(-1) and arc[-1] - arc[k + 1] < near else k + 1
 
     def has_edge(self, end: int) -> bool:
         """Tell whether the branch ends at an event of its inequalities, or at a limit of its parameter."""

@@ -104,6 +104,10 @@ class BallModel:
             self._rates[key] = numbers(below * (self.unscaled or self.fields)[mode])
         return self._rates[key]
 
+    def rate_that_is(self, row: Vector) -> tuple[str, str, int] | None:
+        """Return surface, mode and order of the derivative that a list is, if :meth:`rate` returned it."""
+        return next((key for key, known in self._rates.items() if known is row), None)
+
     @property
     def size(self) -> int:
         """Number of entries of the extended state."""
