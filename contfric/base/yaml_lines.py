@@ -187,10 +187,12 @@ def comma_hint(key: str, value: object = "") -> str:
     --------
     >>> comma_hint("b)")
     '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
+    >>> comma_hint("min(b", None)
+    '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
     >>> comma_hint("of the wall", None)
     '; inside { } a text with a comma needs quotes: {meaning: "a, b"}'
     """
-    if key.count(")") > key.count("("):
+    if key.count(")") != key.count("("):
         return '; inside { } an expression with a comma needs quotes: {x: "max(a, b)"}'
     if value is None:
         return '; inside { } a text with a comma needs quotes: {meaning: "a, b"}'
