@@ -184,13 +184,18 @@ class Strand:
     def after(self, k: int) -> int:
         """Return the next point, or the one after those that are very near to an event or a limit at an end.
 
-        Boxes next to them would reach beyond it.
+        Boxes next to them would reach beyond it. At events only of orbits with holds: next to a continuum,
+        which others come to, long steps fail.
         """
         arc = self.branch.arc
         near, last = _NEAR * float(arc[-1] - arc[0]), len(arc) - 1
-        if k == 0 and self.has_edge(0):
+        if k == 0 and self._is_skipped(0):
             return next((j for j in range(1, last) if arc[j] - arc[0] > near), last)
-        return last if self.has_edge(-1) and arc[-1] - arc[k + 1] < near else k + 1
+        return last if self._is_skipped(-1) and arc[-1] - arc[k + 1] < near else k + 1
+
+    def _is_skipped(self, end: int) -> bool:
+        """Tell whether points very near to an end are no ends of boxes."""
+        return self.is_limit(end) or (bool(self.system.holds) and self.has_edge(end))
 
     def has_edge(self, end: int) -> bool:
         """Tell whether the branch ends at an event of its inequalities, or at a limit of its parameter."""

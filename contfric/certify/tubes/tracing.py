@@ -79,9 +79,8 @@ class Tracer(Strand):
         self.printed_orbits = self.enclosed(points)
         self.unique = {k for k, point in enumerate(points) if point.unique.proved}
         self.held, self.obeying = set[int](), set[int]()
-        for flip in self.flips:
-            if flip is not None:
-                self._hold(flip)
+        for flip in (one for one in self.flips if one is not None):
+            self._hold(flip)
 
     def _flip(self, proofs: list[EventCertificate], end: int) -> Flip | None:
         """Return the box of the event at an end, if that is a PD or BP at which two turns become one."""
@@ -117,7 +116,7 @@ class Tracer(Strand):
         self.missed, self.steady = 0, _STEADY  # boxes in a row that were not proved, and that were
         # the last box that was proved, and how many in a row before one of several steps is tried
         self.proved_length, self.patience = 0.0, _STEADY
-        self.turning = False  # whether a box could not show that the parameter is monotone
+        self.turning = False  # whether a box did not show a monotone parameter
 
     def step(self, k: int, stop: int) -> tuple[list[Piece], int]:
         """Cover the branch from point k to a later one, at most ``stop``; return its number, too.
@@ -136,8 +135,8 @@ class Tracer(Strand):
     def _reached(self, k: int, stop: int) -> int:
         """Return the last point up to which a box is tried from point k: one step, or more."""
         arc, found = self.branch.arc, min(self.after(k), stop)
-        grows = _GROWTH if self.steady >= self.patience else _SAME
-        most = grows * min(self.length, self.proved_length)
+        most = _GROWTH if self.steady >= self.patience else _SAME
+        most *= min(self.length, self.proved_length)
         while found < stop and not (self._is_special(k) or self._is_special(found)):
             if arc[found + 1] - arc[k] > most:
                 break
@@ -284,9 +283,9 @@ class Tracer(Strand):
         self.length = max(self.length, length) if whole else math.inf
         self.steady = self.steady + 1 if whole else _STEADY
         self.missed = self.missed + 1 if admissible.verdict is Verdict.UNDECIDED else 0
-        if box is None or piece is None:
-            return [self._nothing(arcs, first, last)]
-        return [self.linked(piece, box)]
+        if box and piece:
+            return [self.linked(piece, box)]
+        return [self._nothing(arcs, first, last)]
 
     def piece(
         self,
