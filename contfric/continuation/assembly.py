@@ -146,7 +146,7 @@ def _turns_by(
 
 
 def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
-    """Return a branch without the branch points of a multiplier that is 1 at an AS or SS that ends it.
+    """Return a branch without the branch points of a multiplier that is 1 at an AS that ends it.
 
     Where a contact comes to rest for good the locations at which it may are a continuum: a multiplier tends
     to 1 there, and before that, where segments are about to vanish, on which side it is is rounding.
@@ -157,7 +157,7 @@ def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
     idle = set()
     for k, end in zip((0, -1), branch.ends, strict=True):
         last = end.bifurcation
-        if last is None or last.kind not in (Kind.AS, Kind.SS):
+        if last is None or last.kind is not Kind.AS:
             continue
         apart = np.abs(branch.arc - branch.arc[k])
         beside = np.abs(found[(apart > 0.0) & (apart < _NEAR_END)])

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.base.attributes import altered
 from contfric.bvp.conserved import conserved, kept_by
-from contfric.continuation.assembly import _without_critical_ends
-from contfric.continuation.points import settings_of
 from contfric.models.described.evaluate import floats
 from contfric.orbit.itinerary.one_way import only_grows
 from contfric.signature import canonical_itinerary
@@ -377,23 +374,6 @@ def test_many_contacts_that_never_slip_are_followed_until_one_does(
     assert events[0].params["F"] == pytest.approx(first, rel=1e-10)
     assert max(branch.values.max() for branch in diagram.branches) > 1.01 * first
     assert diagram.verify(restarts=2).passed
-    following = next(b for b in diagram.branches if b.values.min() > 0.999 * first)
-    check_critical_end(following, orbit, first)
-
-
-def check_critical_end(branch: cf.Branch, orbit: cf.Orbit, width: float) -> None:
-    """A BP at the AS that it starts from is rounding, also where that is still called SS."""
-    settings = settings_of(orbit, "F", (0.0, width), None, True, 100, None)
-    k = min((0, -1), key=lambda k: branch.values[k])
-    start = branch.ends[k].bifurcation
-    assert start is not None
-    for kind in (cf.Kind.AS, cf.Kind.SS):
-        first = altered(branch.ends[k], bifurcation=altered(start, kind=kind))
-        ends = (first, branch.ends[1]) if k == 0 else (branch.ends[0], first)
-        near = altered(start, kind=cf.Kind.BP, position=float(branch.arc[k]), bound=1e-8)
-        far = altered(near, position=float(branch.arc.mean()))
-        known = altered(branch, ends=ends, bifurcations=(near, far))
-        assert _without_critical_ends(known, settings).bifurcations == (far,)
 
 
 def test_a_datum_off_the_centre_is_kept_until_its_contact_creeps() -> None:
