@@ -66,10 +66,8 @@ HOLD_PERIODS, SLIDE_PERIODS = 1.001, 1e4
 _STRETCH = 256.0
 #: Factor by which the search of a hit is extended: what was searched in vain costs a third more.
 _WIDER = 4.0
-#: Of more surfaces than this most are not the next one that is met. They are searched for over a part of a
-#: period first, the second number to one: many contacts meet something sooner.
+#: More surfaces than this are searched for over one part in so many of a period first: most are not met next.
 _FEW, _SHORTER = 3, 16.0
-
 #: A mass that a wall lets go moves off it with the third power of time: at this share of a period by far more
 #: than rounding, and less than anything else does.
 _AHEAD = 1e-3
@@ -125,12 +123,8 @@ def first_met(functions, tables, mode, on, t, y, p, longest, unit, workspace):  
 @helper
 def hit_within(functions, tables, mode, on, t, y, p, longest, workspace):  # type: ignore[no-untyped-def]
     """Do the same over one time."""
-    observables, bounds, none, empty = (
-        tables.observables,
-        tables.bounds,
-        workspace.none,
-        workspace.empty,
-    )
+    observables, bounds = tables.observables, tables.bounds
+    none, empty = workspace.none, workspace.empty
     best, which = longest, -1
     for k in range(observables.shape[0]):
         if bounds[mode, k] == 0:
