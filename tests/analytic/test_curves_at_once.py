@@ -60,6 +60,8 @@ def test_where_the_load_stands_still_at_a_stop_a_corner_and_an_exit_are_one_curv
     kinds = {part.kind for k in there for part in plane.curves[k].parts}
     told = [note for note in plane.notes if "codimension two all along" in note]
     assert bool(told) == (kinds == {cf.Kind.AS, cf.Kind.CS})
-    assert [n for n in plane.notes if "S=0.3" in n and "h=-0.037037037037" in n and "degenerate" in n]
+    assert [
+        n for n in plane.notes if "S=0.3" in n and "h=-0.037037037037" in n and "degenerate" in n
+    ]
     others = [k for k in range(len(plane.curves)) if k not in there]
     assert all(plane.twins[k] not in there for k in others)
