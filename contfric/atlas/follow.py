@@ -99,9 +99,9 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted = jumps = False
     orbit = event.bifurcation.orbit
-    settled = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
-    if settled or accumulates(event.bifurcation):
-        why = _INCOMPLETE if settled else _ACCUMULATE
+    chatters = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
+    if chatters or accumulates(event.bifurcation):
+        why = _INCOMPLETE if chatters else _ACCUMULATE
         state.judge(event, "go on after the event", Decision.REFUSED, why=why)
         return
     if event.bifurcation.accuracy > _UNKNOWN and _begins_continuum(state, orbit, event):

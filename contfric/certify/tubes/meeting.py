@@ -32,6 +32,8 @@ from contfric.models.balls.numbers import Vector, around, column, numbers
 _NEAR = 1e-5
 #: Steps of Newton's method towards the time at which a rest could be left.
 _NEWTON = 4
+#: How far from where they end that time is looked for: more than rounding, less than events are apart.
+_AROUND = arb(2) ** -50
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,13 +236,13 @@ def _left(
         if slope.contains(0):
             return None
         after = (after - value / slope).mid()
-    wide = around(after, arb(2) ** -50)
+    wide = around(after, _AROUND)
     value = (arb_mat([row]) * (field * after).exp() * start)[0, 0]
     slope = (rate * (field * wide).exp() * start)[0, 0]
     if slope.contains(0):
         return None
     found = after - value / slope
-    if not abs(found - after) < arb(2) ** -50 or not found > 0:
+    if not abs(found - after) < _AROUND or not found > 0:
         return None
     end = numbers((field * found).exp() * start)
     following = cycle.joints[j + 1] if j + 1 < len(cycle.joints) else _moved(cycle, (0, 1))

@@ -139,10 +139,8 @@ def vanishing_at(tracer: Tracer, proofs: list[EventCertificate], end: int) -> Va
         place = short_slide(system, segments, model, i)
         if place is None:
             continue
-        at, last = (
-            (i * m, (i + 1) * m),
-            _last(tracer, place, near) if tracer.is_limit(end) else None,
-        )
+        at = i * m, (i + 1) * m
+        last = _last(tracer, place, near) if tracer.is_limit(end) else None
         reach = float((far[at[1]] - far[at[0]]).mid())
         for _ in range(_HALVINGS if reach > 0 else 0):
             tracer.count += 1

@@ -153,11 +153,9 @@ def unit_of(orbit: Orbit, rests: Collection[str] = ()) -> Unit:
     turns = repetitions(orbit, slides)
     periods = max(1, orbit.periods // turns)
     half = periods % 2 == 1 and repeats(orbit, slides, 2 * turns, mirrored=True)
-    lasts, resting = (
-        orbit.durations,
-        [orbit.model.mode_by_name[m].sliding for m, _ in orbit.itinerary],
-    )
-    held = [any(orbit.model.lies_on(mode, s) for s in rests) for mode, _ in orbit.itinerary]
+    model, lasts = orbit.model, orbit.durations
+    resting = [model.mode_by_name[mode].sliding for mode, _ in orbit.itinerary]
+    held = [any(model.lies_on(mode, s) for s in rests) for mode, _ in orbit.itinerary]
     longest = max(slides, key=lambda i: (not held[i], not resting[i], lasts[i]))
     duration = orbit.period / (turns * (2 if half else 1))
     mode = orbit.itinerary[longest][0]

@@ -10,7 +10,7 @@ CS, another contact changes as one is      the hold goes on in the next mode; in
 let go                                     that change
 CS, the last hold has no length            it is dropped: the slide begins earlier, up to that change
 CS, another contact changes as one begins  the two change in the other order: the hold begins in the
-to be held                                 mode before it, or behind it
+to be held                                 mode before it, or after it
 the last hold meets its limit              all are sticks
 =========================================  =============================================================
 """
@@ -24,6 +24,7 @@ from contfric.errors import NotationError
 from contfric.events.local.jumps import leaving_rate
 from contfric.events.local.zero_acceleration import first_zero_acceleration, touch_of
 from contfric.models.definition import Model
+from contfric.orbit.canonical.slides import time_unit
 from contfric.orbit.orbit import Orbit
 from contfric.signature.edits import Edit
 from contfric.signature.holds import (
@@ -36,7 +37,8 @@ from contfric.signature.holds import (
     pinned_surface,
 )
 
-#: What is met at the same time is that far apart (nondimensional) at most, as located.
+#: What is met at the same time is that far apart at most (as a share of the time unit): a slide of no length
+#: between is known to the root of the accuracy of an event.
 _AT_ONCE = 1e-3
 
 Joints = dict[tuple[int, int], FloatArray]
@@ -69,7 +71,7 @@ def goes_on(orbit: Orbit, h: int, surface: str) -> tuple[Edit, Joints, str]:
     itinerary, model, hold = orbit.itinerary, orbit.model, hold_in(orbit, h)
     count, mode = len(itinerary), itinerary[h][0]
     slide = (h + 1) % count
-    if itinerary[slide][1] != surface or orbit.durations[slide] > _AT_ONCE:
+    if itinerary[slide][1] != surface or orbit.durations[slide] > _AT_ONCE * time_unit(orbit):
         raise NotationError(
             f"{surface} is met where hold {h + 1} ends, and not by the slide after it"
         )
@@ -121,7 +123,7 @@ def at_beginning(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, s
     elif location.margin is not Margin.JOINT:
         return None
     following = [orbit.itinerary[(i + k) % count] for k in (1, 2)]
-    short = orbit.durations[(i + 1) % count] < _AT_ONCE
+    short = orbit.durations[(i + 1) % count] < _AT_ONCE * time_unit(orbit)
     if count < 4 or not short or not is_hold(following[1][1]):
         return None
     if is_hold(following[0][1]):
@@ -256,6 +258,6 @@ class Rest:
 
     @property
     def further(self) -> dict[int, str]:
-        """The exits of the parts behind the first as parts of a hold."""
+        """The exits of the parts after the first as parts of a hold."""
         itinerary = self.orbit.itinerary
         return {k: hold_at(itinerary[k - 1][1]) for k in self.parts[1:]}

@@ -29,8 +29,6 @@ _FARTHER = 6
 _STILL = 2.0**-53
 #: On a surface: rounding of an observable of size 1.
 ON = 1e-12
-#: More states than are looked at anywhere.
-_MANY = 10**9
 #: Modes up to which each is looked at in as many states as one mode alone is.
 FEW_MODES = 9
 
@@ -178,7 +176,7 @@ class Probe:
     ) -> Iterator[Place]:
         """Yield what is found near the first states; each is asked for once, whatever looks there again."""
         if key not in self._known:
-            self._known[key] = Prefix(near(t, y) for t, y in self.states(_MANY))
+            self._known[key] = Prefix(near(t, y.copy()) for t, y in self._drawn.first())
         for place in self._known[key].first(count):
             if place is not None:
                 yield place[0], place[1].copy()
@@ -258,9 +256,9 @@ class Prefix(Generic[T]):
         self._elements = elements
         self._known: list[T] = []
 
-    def first(self, count: int) -> Iterator[T]:
-        """Yield the first elements."""
-        for k in range(count):
+    def first(self, count: int | None = None) -> Iterator[T]:
+        """Yield the first elements, or all of them."""
+        for k in itertools.count() if count is None else range(count):
             if k == len(self._known):
                 self._known.append(next(self._elements))
             yield self._known[k]
