@@ -141,7 +141,7 @@ def test_each_sequence_is_told_by_its_own_relations(seed: int) -> None:
         )
         values = some @ np.concatenate([solved[:m], solved[:m], [1.0], solved[m:]])
         some *= (np.sign(values) * rng.choice([1.0, -1.0]))[:, None]
-        relations.append(Relation(rows, some, np.zeros(k)))
+        relations.append(Relation(rows, some, np.zeros(k), np.ones(m)))
     chosen = [(0,), (1,), (2,)]
     alone = [possible([relation], [(0,)])[0] for relation in relations]
     often = [replace(r, margins=np.repeat(r.margins, 5, axis=0)) for r in relations]

@@ -42,12 +42,13 @@ def springs(seed: int) -> np.ndarray:
 
 
 @cache
-def drawn(seed: int) -> cf.Diagram:
-    """Explore two masses on friction."""
+def drawn(seed: int, unit: float = 1.0) -> cf.Diagram:
+    """Explore two masses on friction, with time in such a unit."""
     p, stiffness = numbers(seed), springs(seed)
+    p = p | {"w": unit * p["w"]}
     model = cf.Mechanism(
-        np.diag([1.0, p["m"]]),
-        0.04 * stiffness,
+        np.diag([1.0, p["m"]]) / unit**2,
+        0.04 * stiffness / unit,
         stiffness,
         contacts={
             name: {"kind": "friction", "velocity": f"v{i}", "kinetic": f"S{i}", "static": f"T{i}"}
@@ -121,6 +122,18 @@ def test_the_diagram_is_the_same_from_every_branch(seed: int) -> None:
     assert not diagram.loose_ends
     assert all(restart.same for restart in held.restarts), [str(r) for r in held.restarts]
     assert held.balances and all(balance.holds for balance in held.balances)
+
+
+@pytest.mark.parametrize("unit", [0.03, 30.0])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_it_is_the_same_in_another_unit_of_time(seed: int, unit: float) -> None:
+    """What happens at once does so in milliseconds and in minutes."""
+    here, there = drawn(seed), drawn(seed, unit)
+    assert not there.loose_ends
+    assert [str(b.name) for b in here.branches] == [str(b.name) for b in there.branches]
+    placed = [[(str(n.bifurcation.kind), n.bifurcation.orbit.params["w"]) for n in d.nodes] for d in (here, there)]
+    assert [kind for kind, _ in placed[0]] == [kind for kind, _ in placed[1]]
+    assert np.allclose([w for _, w in placed[0]], [w / unit for _, w in placed[1]], rtol=1e-7)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -29,6 +29,7 @@ complementarity problem of docs/bridges.md, written so that an outcome of any ki
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +43,7 @@ from contfric.events.local.gradients import closing, gradient_of
 from contfric.events.local.jumps import nothing_jumps
 from contfric.events.outcomes.outcomes import NEARLY_NO_LENGTH
 from contfric.orbit.canonical.slides import time_unit
+from contfric.orbit.measured.samples import state_within
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import TOUCH, ends_rest, is_hold
 
@@ -58,6 +60,10 @@ _CLEAR = 0.2
 #: Condition number from which a sequence's own equations are singular at the event: undecided, too. (Without
 #: damping a slide may last a whole natural period, and its start then moves its end to second order only.)
 _SINGULAR = 1e9
+#: Where in a segment states are looked at: velocities are zero at its ends.
+_INSIDE = 0.381966
+#: States that are smaller than this share of the largest are rounding.
+_NONE = 1e-12
 #: Inequalities violated by less than this share of the largest number in them are undecided: the
 #: sequence is tried.
 _UNDECIDED = 1e-4
@@ -75,11 +81,14 @@ class Relation:
         What must not be negative, on the same.
     signed : ndarray, shape (k,)
         Whether each q has a sign.
+    units : ndarray, shape (m,)
+        What joints are measured in where numbers are compared: rows and margins are in those of the model.
     """
 
     rows: FloatArray
     margins: FloatArray
     signed: FloatArray
+    units: FloatArray
 
 
 @dataclass(frozen=True)
@@ -106,18 +115,22 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
     system, m = orbit.system, orbit.joints.shape[1]
     a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector, (active,))
     inner, outer = _columns(a, b, c[:, :, 0], close)
+    own = _units(orbit)
+    units = np.tile(own, orbit.system.segments - 1)  # of the inner joints
+    inner *= units
+    equations = np.abs(np.hstack([inner, outer[:, :-1] * np.tile(own, 2)])).max(axis=1)
+    inner, outer = inner / equations[:, None], outer / equations[:, None]
     left, size, right = np.linalg.svd(inner)
     rank = int(np.sum(size > _NULL * (size[0] if size.size else 1.0)))
-    free = right[rank:]
+    free = right[rank:] * units
     rest = left[:, rank:].T
-    moves = (
-        -(right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer
-    )  # inner joints by (u, u', lambda)
+    moves = -(units[:, None] * right[:rank].T / size[:rank]) @ left[:, :rank].T @ outer
     margins, signed = [], np.zeros(len(free))
     for gradient, slope in _gradients(orbit, active, least, parted):
         on_inner = gradient[1:-1].ravel()
         along = free @ on_inner
-        bent = np.flatnonzero(np.abs(along) > _NULL * (1.0 + np.abs(on_inner).max(initial=0.0)))
+        largest = np.abs(gradient * own).max()
+        bent = np.flatnonzero(np.abs(along) > _NULL * largest)
         if bent.size:  # it is of the order of a freedom, which it gives its sign
             for k in map(int, bent):
                 free[k] *= np.copysign(1.0, along[k]) if not signed[k] else 1.0
@@ -130,14 +143,14 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
         margins.append(np.concatenate([row, np.zeros(len(free))]))
     effects = []
     for k, direction in enumerate(free):
-        effect = _effect(orbit, direction.reshape(-1, m), rest)
+        effect = _effect(orbit, direction.reshape(-1, m), rest / equations)
         if effect is None:
             return None
         effects.append(effect[0])
         signed[k] = max(signed[k], float(effect[1] % 2 == 0))
     rows = np.hstack([rest @ outer, *(effect[:, None] for effect in effects)])
     found = np.array(margins).reshape(len(margins), 2 * m + 1 + len(free))
-    return Relation(rows, found, signed)
+    return Relation(rows, found, signed, own)
 
 
 def _columns(
@@ -161,9 +174,9 @@ def _columns(
 def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[FloatArray, int] | None:
     """Return what a null direction does to the remaining equations, and its order; None if that is not clear.
 
-    Times move by the step; a direction is scaled so that its largest component is 1.
+    A direction is scaled so that its largest component is the size of what it moves.
     """
-    direction = direction / np.abs(direction).max()
+    direction = direction / np.abs(direction / _units(orbit)).max()
     sizes = []
     found = []
     for step in (_STEP, 0.5 * _STEP):
@@ -178,6 +191,14 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
     if abs(nearest - order) > _CLEAR:
         return None
     return found[0] / sizes[0], nearest
+
+
+def _units(orbit: Orbit) -> FloatArray:
+    """Return what joints are measured in, shape (m,): a phase of 1, and the size of each state."""
+    inside = (state_within(orbit, i, _INSIDE * d) for i, d in enumerate(orbit.durations.tolist()))
+    sizes = np.abs(np.concatenate([orbit.ends[:, 1:], list(inside)])).max(axis=0)
+    sizes[sizes < _NONE * sizes.max()] = sizes.max() or 1.0  # what is always zero has no size
+    return np.concatenate([[orbit.period / (math.tau * orbit.periods)], sizes])
 
 
 def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
@@ -284,9 +305,12 @@ def possible(
         full[:, at, ahead : ahead + m] += block[:, :, m : 2 * m]
         full[:, at, j * width + m : (j + 1) * width] += block[:, :, 2 * m + 1 :]
         right[:, at] = -block[:, :, 2 * m]
+    units = np.tile(np.concatenate([relations[0].units, np.ones(most)]), length)
+    full *= units
     singular = np.linalg.cond(full) > _SINGULAR
     full[singular] = np.eye(length * width)
-    solved = np.linalg.solve(full, right[:, :, None])[:, :, 0].reshape(count, length, width)
+    measured = np.linalg.solve(full, right[:, :, None])[:, :, 0]
+    solved = (units * measured).reshape(count, length, width)
     joints = solved[:, :, :m]
     ahead_joints = np.roll(joints, -1, axis=1)
     lam = np.ones((count, length, 1))
@@ -295,7 +319,7 @@ def possible(
     values = np.einsum("sjgk,sjk->sjg", picked, local)
     scale = np.einsum("sjgk,sjk->sjg", np.abs(picked), np.abs(local)) * _UNDECIDED
     q = solved[:, :, m:] * signed[chosen]
-    slack = _UNDECIDED * np.abs(solved).max(axis=(1, 2))[:, None, None]
+    slack = _UNDECIDED * np.abs(measured).max(axis=1)[:, None, None]
     fine = ~singular
     above = np.all(values >= -scale, axis=(1, 2)) & np.all(q >= -slack, axis=(1, 2))
     below = np.all(values <= scale, axis=(1, 2)) & np.all(q <= slack, axis=(1, 2))
