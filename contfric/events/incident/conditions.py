@@ -29,7 +29,6 @@ complementarity problem of docs/bridges.md, written so that an outcome of any ki
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,7 +42,7 @@ from contfric.events.local.gradients import closing, gradient_of
 from contfric.events.local.jumps import nothing_jumps
 from contfric.events.outcomes.outcomes import NEARLY_NO_LENGTH
 from contfric.orbit.canonical.slides import time_unit
-from contfric.orbit.measured.samples import state_within
+from contfric.orbit.measured.joint_units import joint_units
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import TOUCH, ends_rest, is_hold
 
@@ -60,10 +59,6 @@ _CLEAR = 0.2
 #: Condition number from which a sequence's own equations are singular at the event: undecided, too. (Without
 #: damping a slide may last a whole natural period, and its start then moves its end to second order only.)
 _SINGULAR = 1e9
-#: Where in a segment states are looked at: velocities are zero at its ends.
-_INSIDE = 0.381966
-#: States that are smaller than this share of the largest are rounding.
-_NONE = 1e-12
 #: Inequalities violated by less than this share of the largest number in them are undecided: the
 #: sequence is tried.
 _UNDECIDED = 1e-4
@@ -115,7 +110,7 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
     system, m = orbit.system, orbit.joints.shape[1]
     a, b, c, close = jacobian_blocks(system, orbit.joints, orbit.vector, (active,))
     inner, outer = _columns(a, b, c[:, :, 0], close)
-    own = _units(orbit)
+    own = joint_units(orbit)
     units = np.tile(own, orbit.system.segments - 1)  # of the inner joints
     inner *= units
     equations = np.abs(np.hstack([inner, outer[:, :-1] * np.tile(own, 2)])).max(axis=1)
@@ -176,7 +171,7 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
 
     A direction is scaled so that its largest component is the size of what it moves.
     """
-    direction = direction / np.abs(direction / _units(orbit)).max()
+    direction = direction / np.abs(direction / joint_units(orbit)).max()
     sizes = []
     found = []
     for step in (_STEP, 0.5 * _STEP):
@@ -191,14 +186,6 @@ def _effect(orbit: Orbit, direction: FloatArray, rest: FloatArray) -> tuple[Floa
     if abs(nearest - order) > _CLEAR:
         return None
     return found[0] / sizes[0], nearest
-
-
-def _units(orbit: Orbit) -> FloatArray:
-    """Return what joints are measured in, shape (m,): a phase of 1, and the size of each state."""
-    inside = (state_within(orbit, i, _INSIDE * d) for i, d in enumerate(orbit.durations.tolist()))
-    sizes = np.abs(np.concatenate([orbit.ends[:, 1:], list(inside)])).max(axis=0)
-    sizes[sizes < _NONE * sizes.max()] = sizes.max() or 1.0  # what is always zero has no size
-    return np.concatenate([[orbit.period / (math.tau * orbit.periods)], sizes])
 
 
 def _residual(orbit: Orbit, joints: FloatArray) -> FloatArray:
