@@ -19,6 +19,8 @@ from contfric.signature.reduced import canonical_itinerary, reduced_itinerary
 SEEDS = (9, 34, 41, 45, 7)
 #: What a state may differ by from one that is simulated, and a load from its limit.
 MOTION = 1e-9
+#: What a place may differ by in another unit.
+PLACE = 1e-6
 NAMES = ("low", "high")
 
 
@@ -124,16 +126,29 @@ def test_the_diagram_is_the_same_from_every_branch(seed: int) -> None:
     assert held.balances and all(balance.holds for balance in held.balances)
 
 
-@pytest.mark.parametrize("unit", [0.03, 30.0])
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("unit", [0.03, 0.55, 30.0])
+@pytest.mark.parametrize("seed", (*SEEDS, 118, 248))
 def test_it_is_the_same_in_another_unit_of_time(seed: int, unit: float) -> None:
-    """What happens at once does so in milliseconds and in minutes."""
+    """Both have the same branches and events: one had a bridge twice (118), and no T next to its end (248)."""
     here, there = drawn(seed), drawn(seed, unit)
     assert not there.loose_ends
-    assert [str(b.name) for b in here.branches] == [str(b.name) for b in there.branches]
-    placed = [[(str(n.bifurcation.kind), n.bifurcation.orbit.params["w"]) for n in d.nodes] for d in (here, there)]
-    assert [kind for kind, _ in placed[0]] == [kind for kind, _ in placed[1]]
-    assert np.allclose([w for _, w in placed[0]], [w / unit for _, w in placed[1]], rtol=1e-7)
+    for places in (_ends_of_branches, _places_of_events):
+        one, other = places(here, 1.0), places(there, unit)
+        assert [kind for kind, *_ in one] == [kind for kind, *_ in other]
+        assert np.allclose([at for _, *at in one], [at for _, *at in other], atol=PLACE)
+
+
+def _ends_of_branches(diagram: cf.Diagram, unit: float) -> list[tuple[object, float, float]]:
+    own = [b for b in diagram.branches if not b.mirrored]
+    return sorted(
+        (b.bridge, *sorted(round(at / unit, 7) for at in (b.values[0], b.values[-1]))) for b in own
+    )
+
+
+def _places_of_events(diagram: cf.Diagram, unit: float) -> list[tuple[str, float]]:
+    """Where each kind of event is; which branch gives an orbit its name differs."""
+    found = [n.bifurcation for n in diagram.events if not n.mirrored]
+    return sorted((b.kind.value, round(b.params["w"] / unit, 7)) for b in found)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -70,11 +70,15 @@ def first_told(step: Step) -> Point:
     At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
     """
     before = step.before
-    at_event = np.min(before.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION
-    pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
+    pole = at_event(before) and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
     if not pole or step.length <= 2.0 * SAME_LOCATION:
         return before
     return _if_finite(point_before(step.orbit, before, -SAME_LOCATION, step.settings)) or before
+
+
+def at_event(point: Point) -> bool:
+    """Tell whether a point is a located sliding event."""
+    return bool(np.min(point.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION)
 
 
 def _if_finite(point: Point | None) -> Point | None:

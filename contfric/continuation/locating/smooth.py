@@ -13,6 +13,7 @@ from contfric.continuation.accuracy.near_sliding_events import (
     SAME_FOLD,
     SAME_LOCATION,
     SAME_VALUE,
+    at_event,
     first_told,
     last_told,
     point_at,
@@ -275,7 +276,8 @@ def _undone(step: Step, others: list[Located]) -> list[Located]:
     """Return the changes of labels that are the same at both ends of a step in which others change.
 
     One touch may go from segment to segment: what it changes in one of them is undone soon. So labels are
-    asked on both sides of the changes that are known, first by the tangent, which is near enough there.
+    asked on both sides of the changes that are known, first by the tangent, which is near enough there. So
+    they are next to a sliding event: what touches a surface there may be on either side of it by rounding.
     """
     from contfric.continuation.core.locate import BY_PARAMETER
 
@@ -284,7 +286,8 @@ def _undone(step: Step, others: list[Located]) -> list[Located]:
     if not (before.labels == after.labels).any():
         return found
     known = sorted((point for event, point in others if event.located), key=lambda p: p.arc)
-    for (one, near), (other, far) in pairwise([(before, 0), *((p, 1) for p in known), (after, 0)]):
+    within = [(before, at_event(before)), *((p, True) for p in known), (after, at_event(after))]
+    for (one, near), (other, far) in pairwise(within):
         if other.arc - one.arc < SAME_TANGENCY or one.value == other.value:
             continue
         sides = [(one, _NEARBY)] * near + [(other, -_NEARBY)] * far
