@@ -149,8 +149,9 @@ class Names:
 
     def scope(self, algebra: Algebra[T], values: Mapping[str, T]) -> Scope[T]:
         """Return the scope of all names, with the values of states, parameters and t."""
-        return Scope(algebra, dict(values), self._trees)
+        return Scope(algebra, dict(values), self.trees)
 
     @cached_property
-    def _trees(self) -> dict[str, ast.expr]:
+    def trees(self) -> dict[str, ast.expr]:
+        """The expressions of all named parts, read."""
         return {name: parse(text) for name, text in self.parts.items()}
