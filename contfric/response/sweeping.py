@@ -90,7 +90,7 @@ def sweep(
 
     At each value the solution goes on from the state at the value before. Its points on the section are
     collected after a transient. One that repeats itself to rounding is left at once, and has the points
-    of one period. Where nothing can be carried over (the solution grew, or no solution starts there) the
+    of one period. Where nothing can be carried over (the solution diverged, or no solution starts there) the
     next value begins with the model's start. Ctrl-C ends the computation; what was found is returned.
 
     Parameters

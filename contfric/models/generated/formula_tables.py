@@ -73,14 +73,14 @@ class Forms:
         }
 
     def add(self, mode: ModeText, named: Mapping[str, str]) -> None:
-        """Read the rates in a mode, which comes behind those that are known; they use named expressions."""
+        """Read the rates in a mode, which comes after those that are known; they use named expressions."""
         for name, text in named.items():
             self._scope.values[name] = self.form(text)
         self.modes.append(mode)
         self.fields.append(self._field(mode))
 
     def see(self, surface: Surface, formula: str) -> bool:
-        """Read a surface that comes behind those that are known; tell whether its observable is new."""
+        """Read a surface that comes after those that are known; tell whether its observable is new."""
         names = [o.name for o in self.seen]
         self.surfaces.append(surface)
         self.levels.append(self._constant(surface.level))

@@ -39,7 +39,7 @@ class TransitionMaps(ChatterMaps):
         return False
 
     def mode_order(self, name: str) -> int:
-        """Return the place of a mode in words that are compared."""
+        """Return the place of a mode in itineraries that are compared."""
         return self._mode_places[name]
 
     @cached_property
@@ -83,7 +83,7 @@ class TransitionMaps(ChatterMaps):
         return all(domain.signs.get(surface) == 0 for domain in own)
 
     def rests_on(self, surface: str) -> bool:
-        """Return whether some mode moves on a surface; at rest on a wall a mass is there behind chatter."""
+        """Return whether some mode moves on a surface; at rest on a wall a mass is there after chatter."""
         return any(
             domain.signs[surface] == 0
             for domain in self.domains
@@ -170,7 +170,7 @@ class TransitionMaps(ChatterMaps):
     def _chosen_at(self, domain: Domain, surface: Surface, target: Domain) -> tuple[int, ...]:
         """Return the sides at which it is chosen in which mode motion goes on.
 
-        Motion that turns back at a surface has entered a mode behind it.
+        Motion that turns back at a surface has entered a mode beyond it.
         """
         if not surface.switching and domain.own_mode != target.own_mode:
             through = {**domain.signs, surface.name: -domain.signs[surface.name]}
@@ -196,7 +196,7 @@ class TransitionMaps(ChatterMaps):
         return None if reset is None or (reset.modes and mode not in reset.modes) else reset
 
     def ends_at(self, domain: Domain, surface: str) -> bool:
-        """Return whether motion meets a reset that acts in other modes only, and no mode holds behind it.
+        """Return whether motion meets a reset that acts in other modes only, and no mode holds beyond it.
 
         Motion that a reset does not map passes its surface, as it passes any other.
         """
