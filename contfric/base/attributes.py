@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-__all__ = ["altered", "cached_property"]
+__all__ = ["altered", "cached_property", "kept"]
 
 if TYPE_CHECKING:
     from functools import cached_property
@@ -39,6 +40,36 @@ else:
 
 
 _T = TypeVar("_T")
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def kept(method: _F) -> _F:
+    """Return a method that keeps what it returns in its object, by its arguments, and computes it once.
+
+    Examples
+    --------
+    >>> class Powers:
+    ...     base = 3
+    ...
+    ...     @kept
+    ...     def of(self, exponent: int) -> int:
+    ...         print("computed")
+    ...         return self.base**exponent
+    >>> powers = Powers()
+    >>> powers.of(2), powers.of(2)
+    computed
+    (9, 9)
+    """
+    place = f"{method.__name__}()"
+
+    @functools.wraps(method)
+    def value(self: Any, *arguments: Any) -> Any:
+        known = self.__dict__.setdefault(place, {})
+        if arguments not in known:
+            known[arguments] = method(self, *arguments)
+        return known[arguments]
+
+    return cast("_F", value)
 
 
 @functools.cache

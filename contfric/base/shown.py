@@ -63,6 +63,15 @@ class Shown:
         return f"<p><b>{_cut(repr(self).splitlines()[0])}</b></p><table>{rows}</table>"
 
 
+class AtParameters(Shown):
+    """A result at one set of parameters: ``vector`` of a ``model``."""
+
+    @property
+    def params(self) -> dict[str, float]:
+        """All parameters by name."""
+        return self.model.mapping(self.vector)  # type: ignore[attr-defined,no-any-return]
+
+
 def _cut(text: str) -> str:
     """Return a text for a cell, without its end if it is long."""
     from html import escape  # a notebook needs it, a run does not

@@ -34,7 +34,7 @@ def as_table(columns: Any, origins: Iterable[tuple[str, str]] = ()) -> pd.DataFr
 
 
 def stacked(parts: Iterable[tuple[dict[str, Any], pd.DataFrame]]) -> pd.DataFrame:
-    """Return tables one below the other, each behind columns of one value (needs pandas)."""
+    """Return tables one below the other, each after columns of one value (needs pandas)."""
     need_pandas()
     import pandas as pd
 

@@ -11,14 +11,15 @@ admissible) are
 
 Crossings of transparent surfaces inside a segment do not matter to the solution; they label it.
 
-A hold (:mod:`contfric.bvp.holds`) has a pin at its start in the place of the exit surface. Its exit
-margin is the acceleration with which it is left, which must not be negative anywhere on the way (HELD);
+A hold (a delayed release, :mod:`contfric.bvp.holds`) has a defining condition at its start, its pin, in the
+place of the exit surface. Its exit margin is the acceleration with which it is left, which must not be
+negative anywhere on the way (HELD);
 one that follows a stick must last, and so must that stick, whose end is tangential, a slide that leads from
 one hold to the touch of another, and the last part of a hold in several modes (LASTING). Where such a segment
 shrinks to nothing, other margins may have a double zero: they are divided by the square of its duration, for
 what is left of them is their sign.
 
-Everything here derives from the model's definition; nothing knows what moves.
+Everything here derives from the model's definition: no model is a special case.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Layout(NamedTuple):
     pins : surface that each hold starts on, shape (N,); -2 after a touch, -1 where there is no hold
     departs : mode in which each hold is left, or its own if it goes on in another one, shape (N,); -1 where
         there is no hold
-    resets : surface of the reset that each segment begins behind, shape (N,); -1 without one
+    resets : surface of the reset that each segment begins after, shape (N,); -1 without one
     returns : 1 for segments that begin on their exit surface, so that they may shrink to nothing, shape (N,);
         0 for the last where all do
     lasting : segments that must last: holds after a stick, and that stick; a slide from a hold to a touch at

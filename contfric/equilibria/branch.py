@@ -48,7 +48,7 @@ class EquilibriumBranch(Tabled):
         The parameter at each point.
     states : ndarray, shape (k, n)
     eigenvalues : ndarray, shape (k, n)
-        nan behind those within the surfaces of a mode.
+        nan after those within the surfaces of a mode.
     regions : tuple of ModeRegion
         Region of each point.
     admissible : ndarray of bool, shape (k,)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.base.shown import Shown
+from contfric.base.shown import AtParameters
 from contfric.base.tabled import stacked
 from contfric.equilibria.branch import EquilibriumBranch
 from contfric.equilibria.events import EquilibriumEvent, HopfPoint
@@ -32,7 +32,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class EquilibriumDiagram(Shown):
+class EquilibriumDiagram(AtParameters):
     """Branches of equilibria over a range; the result of :func:`contfric.explore_equilibria`.
 
     Attributes
@@ -66,11 +66,6 @@ class EquilibriumDiagram(Shown):
 
     def __len__(self) -> int:
         return len(self.branches)
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name, at the start."""
-        return self.model.mapping(self.vector)
 
     @property
     def events(self) -> tuple[EquilibriumEvent, ...]:

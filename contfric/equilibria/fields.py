@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.base.attributes import kept
 
 Function = Callable[..., np.ndarray]
 
@@ -99,18 +100,12 @@ class Fields:
         formulas = self._along(self._along(self._along(self._attracted, u), v), w)
         return self._function(formulas, u, v, w)
 
-    @cached_property
-    def _by_parameter(self) -> dict[int, tuple[Function, Function]]:
-        return {}
-
+    @kept
     def _parametric(self, active: int) -> tuple[Function, Function]:
         """Return the derivative by a parameter, and that of it in a direction."""
-        if active not in self._by_parameter:
-            u = self._directions("u")
-            formulas = [g.diff(self.parameters[active]) for g in self._attracted]
-            mixed = self._function(self._along(formulas, u), u)
-            self._by_parameter[active] = self._function(formulas), mixed
-        return self._by_parameter[active]
+        u = self._directions("u")
+        formulas = [g.diff(self.parameters[active]) for g in self._attracted]
+        return self._function(formulas), self._function(self._along(formulas, u), u)
 
     def slope(self, y: FloatArray, p: FloatArray, active: int) -> FloatArray:
         """Return the derivatives of g by one parameter, shape (n,)."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
-from contfric.base.shown import Shown
+from contfric.base.shown import AtParameters
 from contfric.base.tabled import as_table
 from contfric.models.definition import Model
 
@@ -36,7 +35,7 @@ class Location(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Rest(Shown):
+class Rest(AtParameters):
     """A state at which one mode rests: what an equilibrium and a set of them have in common."""
 
     region: ModeRegion
@@ -47,11 +46,6 @@ class Rest(Shown):
     def model(self) -> Model:
         """The model that rests."""
         return self.region.model
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     @property
     def mode(self) -> str:
@@ -169,7 +163,7 @@ class EquilibriumSet(Rest):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Equilibria(Shown):
+class Equilibria(AtParameters):
     """All equilibria that were found at some parameters; the result of :func:`contfric.find_equilibria`.
 
     Attributes
@@ -214,11 +208,6 @@ class Equilibria(Shown):
     def virtual(self) -> tuple[Equilibrium, ...]:
         """Zeros of fields outside of their regions."""
         return tuple(e for e in self.points if e.location is Location.VIRTUAL)
-
-    @cached_property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return one row for each equilibrium, virtual ones too (needs pandas)."""

@@ -163,10 +163,8 @@ def _event(arc: Arc, crossing: LocatedSignChange) -> tuple[EquilibriumEvent | No
     parameter = arc.region.model.parameter_names[arc.active]
     before, after = (_stable(arc, side) for side in (crossing.before, crossing.after))
     common = (parameter, at, before, after)
-    if crossing.test == "SN":
-        return EquilibriumEvent(EquilibriumKind.SN, *common), None
-    if crossing.test == "BP":
-        return EquilibriumEvent(EquilibriumKind.BP, *common), None
+    if crossing.test in ("SN", "BP"):
+        return EquilibriumEvent(EquilibriumKind(crossing.test), *common), None
     if crossing.test == "H":
         return HopfPoint(EquilibriumKind.H, *common, centre_of(arc.region, y, p, arc.active)), None
     if arc.region.domain_of(y, p)[1]:

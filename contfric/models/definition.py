@@ -1,4 +1,4 @@
-"""What moves: parameters, observables, surfaces, domains, modes and the symmetry of a model.
+"""The definition of a model: its parameters, observables, surfaces, modes, domains, resets and symmetry.
 
 A model is defined once, here, and everything else derives from it: the transition graph, the
 simulation, the boundary-value problem, admissibility and the drawings.
@@ -15,7 +15,7 @@ domain exists there (a stick), leaves it as the model's departures say if one of
 otherwise goes through to the other side. After a reset the signs of the mapped state decide, so that
 several domains can follow (:attr:`Model.targets`).
 
-Motion is cut at switching surfaces and at resets, and only there: each has a mode of its own on each
+Solutions are cut at switching surfaces and at resets, and only there: each has a mode of its own on each
 side. Where cycles may be smooth, the surface of the stops (``v = 0``) has two modes of the same field on its
 sides: it is a section (:mod:`contfric.models.maps.section_maps`).
 """
@@ -97,14 +97,14 @@ class Model(Shown, TransitionMaps):
         Whether rest is left without acceleration everywhere (static and kinetic limit agree): slides may then
         shrink to nothing.
     turned : frozenset of (str, str)
-        (mode, surface): motion that enters the mode where it meets the surface turns back, as that of
+        (mode, surface): a solution that enters the mode where it meets the surface turns back, as that of
         a thermostat when its heater is switched off.
     turned_at_times : frozenset of (str, str)
         The same, where it turns back from some states and goes on from others.
     max_step : float or None
         Largest step of a continuation, as a share of the range; None for that of the engine.
     rounding : float
-        Relative rounding of its motion, the floor of what Newton's method can reach; that of integration.
+        Relative rounding of its solutions, the floor of what Newton's method can reach; that of integration.
     displacement : str
         The displacement as an observable, where it may have extrema inside of segments; else empty.
     phase : str

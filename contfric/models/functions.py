@@ -64,14 +64,10 @@ class _Printer(StrPrinter):  # type: ignore[misc]
     def _print_Float(self, expr: Any) -> str:
         return repr(float(expr))
 
-    def _print_Abs(self, expr: Any) -> str:
-        return f"abs({self._print(expr.args[0])})"
+    def _named(self, expr: Any) -> str:
+        return f"{type(expr).__name__.lower()}({self.stringify(expr.args, ', ')})"
 
-    def _print_Min(self, expr: Any) -> str:
-        return f"min({self.stringify(expr.args, ', ')})"
-
-    def _print_Max(self, expr: Any) -> str:
-        return f"max({self.stringify(expr.args, ', ')})"
+    _print_Abs = _print_Sign = _print_Min = _print_Max = _named
 
     def _print_Exp1(self, expr: Any) -> str:
         return "exp(1)"
@@ -82,9 +78,6 @@ class _Printer(StrPrinter):  # type: ignore[misc]
         for value, condition in reversed(cases):
             text = f"where({self._print(condition)}, {self._print(value)}, {text})"
         return text
-
-    def _print_Sign(self, expr: Any) -> str:
-        return f"sign({self._print(expr.args[0])})"
 
     def _print_Where(self, expr: Any) -> str:
         apart, yes, no = (self._print(part) for part in expr.args)

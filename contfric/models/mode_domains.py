@@ -39,9 +39,9 @@ def _met(model: Model) -> dict[str, tuple[str, ...]]:
 
 
 def open_ends(model: Model, mode: str) -> tuple[str, ...]:
-    """Return surfaces that a mode lies on one side of, with nothing behind: a solution ends there.
+    """Return surfaces that a mode lies on one side of, with nothing on the other: a solution ends there.
 
-    Not those behind another level of the same observable, which is met first. Chatter lies on its wall, and
+    Not those beyond another level of the same observable, which is met first. Chatter lies on its wall, and
     ends where the wall lets go.
     """
     if mode in model.chatter_by_mode:

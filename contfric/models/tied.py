@@ -51,6 +51,13 @@ def _tie(name: str, value: Mapping[str, Any]) -> str:
     return str(value[_TIE])
 
 
+def declaration(model: Model) -> Model | None:
+    """Return the model that declares the formulas of a model, most often itself; None if none does."""
+    if model.definition:
+        return model
+    return load_model(_FORMULAS[model.name]) if model.name in _FORMULAS else None
+
+
 def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
     """Return a model in which parameters are expressions of others.
 
@@ -67,8 +74,8 @@ def with_ties(model: Model, ties: Mapping[str, str]) -> Model:
 
     for name in ties:
         model.index_of(name)
-    source = model if model.definition else load_model(_FORMULAS.get(model.name, model.name))
-    if not source.definition:
+    source = declaration(model)
+    if source is None:
         raise ParameterError(
             f"model '{model.name}' is not declared by formulas: its parameters cannot be tied"
         )

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.base.shown import Shown
+from contfric.base.shown import AtParameters
 from contfric.errors import ParameterError, whole_number
 from contfric.models.definition import Domain, Model
 from contfric.models.described.description import Description
@@ -71,7 +71,7 @@ class TwoFoldKind(str, Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class TwoFold(Shown):
+class TwoFold(AtParameters):
     """A two-fold, or one place of a set of them.
 
     Attributes
@@ -94,11 +94,6 @@ class TwoFold(Shown):
     curvatures: tuple[float, float]
     kind: TwoFoldKind
     dimension: int
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     def __repr__(self) -> str:
         at = ", ".join(f"{s}={v:.6g}" for s, v in zip(self.model.states, self.state, strict=True))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_xarray
+from contfric.base.shown import AtParameters
 from contfric.base.tabled import Columns, Tabled
 from contfric.chaos.status import Motion
 from contfric.models.definition import Model
@@ -47,7 +48,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class Basins(Tabled):
+class Basins(AtParameters, Tabled):
     """What starts on a grid converge to; the result of :func:`contfric.basins`.
 
     Attributes
@@ -80,11 +81,6 @@ class Basins(Tabled):
     orbits: tuple[Orbit, ...]
     labels: NDArray[np.int32]
     motions: NDArray[np.uint8]
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -10,15 +10,16 @@ from contfric.chaos.running import Progress
 from contfric.errors import ParameterError
 from contfric.models.definition import Model
 from contfric.response.cuts import (
+    BATCH,
     Cut,
     Ends,
     Following,
     SectionPoints,
-    empty_batch,
     empty_ends,
     empty_points,
 )
 from contfric.response.outcome import Outcome
+from contfric.simulation.simulate import EventRows
 from contfric.simulation.starts import displaced
 from contfric.simulation.tables import tables
 
@@ -68,7 +69,7 @@ def collect(
     while done < count:
         flag = new_stop() if stop is None else stop  # a call in a thread uses it up
         part = slice(done, count)
-        rest = ends.behind(done)
+        rest = ends.after(done)
         arguments = (
             model.flow.following(),
             tables(model),
@@ -81,7 +82,7 @@ def collect(
             modes[part].copy(),
             ons[part].copy(),
             flag,
-            empty_batch(n),
+            EventRows.empty(BATCH, n),
             points,
             rest,
         )
@@ -97,7 +98,7 @@ def collect(
                 progress(f"{len(points.times)} points")
             points = _longer(points)
         state = carried.copy() if how.carried else state
-    found = points.first(int(ends.upto[-1]) if count else 0)
+    found = points.at(slice(int(ends.upto[-1]) if count else 0))
     return (found if model.autonomous else _shortest(model, vectors, found, ends)), ends
 
 
@@ -129,13 +130,7 @@ def _shortest(
     if not fewer.any():
         return points
     ends.upto[:] -= np.cumsum(fewer)
-    return SectionPoints(
-        np.array([int(kept.sum())]),
-        points.cycles[kept],
-        points.modes[kept],
-        points.times[kept],
-        points.states[kept],
-    )
+    return points.at(kept)
 
 
 def _goes_on(outcome: int) -> bool:
@@ -154,6 +149,6 @@ def _longer(points: SectionPoints) -> SectionPoints:
     longer = empty_points(_GROWTH * len(points.times), points.states.shape[1])
     count = int(points.number[0])
     longer.number[0] = count
-    for name in ("cycles", "modes", "times", "states"):
-        getattr(longer, name)[:count] = getattr(points, name)[:count]
+    for new, old in zip(longer[1:], points[1:], strict=True):
+        new[:count] = old[:count]
     return longer

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from contfric.base.arrays import FloatArray, IntArray
-from contfric.simulation.simulate import EventRows
 
 #: Events that are followed between two looks at the section: a period or two of most orbits.
 BATCH = 16
@@ -68,15 +67,10 @@ class SectionPoints(NamedTuple):
     times: FloatArray
     states: FloatArray
 
-    def first(self, count: int) -> SectionPoints:
-        """Return the first points, copied."""
-        return SectionPoints(
-            np.array([count]),
-            self.cycles[:count].copy(),
-            self.modes[:count].copy(),
-            self.times[:count].copy(),
-            self.states[:count].copy(),
-        )
+    def at(self, which: Any) -> SectionPoints:
+        """Return some of the points, copied: a slice, or a mask."""
+        rows: list[Any] = [rows[which].copy() for rows in self[1:]]
+        return SectionPoints(np.array([len(rows[0])]), *rows)
 
 
 class Ends(NamedTuple):
@@ -97,39 +91,20 @@ class Ends(NamedTuple):
     itineraries: IntArray
     states: FloatArray
 
-    def behind(self, done: int) -> Ends:
+    def after(self, done: int) -> Ends:
         """Return the rows after those that are done, as views."""
-        return Ends(
-            self.outcomes[done:],
-            self.turns[done:],
-            self.upto[done:],
-            self.itineraries[done:],
-            self.states[done:],
-        )
+        rows: list[Any] = [rows[done:] for rows in self]
+        return Ends(*rows)
 
 
 def empty_points(count: int, n: int) -> SectionPoints:
     """Return empty rows for points."""
-    return SectionPoints(
-        np.zeros(1, dtype=np.int64),
-        np.zeros(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int64),
-        np.zeros(count),
-        np.zeros((count, n)),
-    )
+    cycles, modes = np.zeros((2, count), dtype=np.int64)
+    number = np.zeros(1, dtype=np.int64)
+    return SectionPoints(number, cycles, modes, np.zeros(count), np.zeros((count, n)))
 
 
 def empty_ends(count: int, n: int) -> Ends:
     """Return empty rows for the ends of solutions."""
     outcomes, turns, upto, itineraries = np.zeros((4, count), dtype=np.int64)
     return Ends(outcomes, turns, upto, itineraries, np.zeros((count, n)))
-
-
-def empty_batch(n: int) -> EventRows:
-    """Return empty rows for the events between two looks."""
-    return EventRows(
-        np.empty((BATCH, 2), dtype=np.int64),
-        np.empty(BATCH, dtype=np.int64),
-        np.empty(BATCH),
-        np.empty((BATCH, n)),
-    )

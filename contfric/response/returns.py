@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.base.extras import need_flint
+from contfric.base.shown import AtParameters
 from contfric.base.tabled import Columns, Tabled
 from contfric.errors import ParameterError, number_and, shown, whole_number
 from contfric.models.definition import Model
@@ -25,7 +26,7 @@ _ORBIT, _SETTLED = 3000, 200
 
 
 @dataclass(frozen=True, eq=False)
-class Returns(Tabled):
+class Returns(AtParameters, Tabled):
     """Points of a solution on a section, in order; the result of :func:`contfric.poincare`.
 
     Attributes
@@ -64,11 +65,6 @@ class Returns(Tabled):
 
     def __len__(self) -> int:
         return len(self.times)
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     def coordinate(self, name: str | None = None) -> FloatArray:
         """Return one coordinate of the points: a state by its name, or "t", the phase.
@@ -114,7 +110,7 @@ class Returns(Tabled):
 
 
 @dataclass(frozen=True, eq=False)
-class ReleaseMap(Tabled):
+class ReleaseMap(AtParameters, Tabled):
     """The map from the phase of one release to that of the next; the result of :func:`contfric.release_map`.
 
     Attributes
@@ -162,11 +158,6 @@ class ReleaseMap(Tabled):
 
     def __len__(self) -> int:
         return len(self.phases)
-
-    @property
-    def params(self) -> dict[str, float]:
-        """All parameters by name."""
-        return self.model.mapping(self.vector)
 
     @property
     def branches(self) -> list[tuple[FloatArray, FloatArray]]:

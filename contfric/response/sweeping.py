@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +26,7 @@ from contfric.models.tied import tied
 from contfric.remember.folder import kept_in
 from contfric.remember.journal import Parts
 from contfric.response.collecting import collect, repeats_of
-from contfric.response.cuts import Cut, Following
+from contfric.response.cuts import Cut, Ends, Following, SectionPoints, empty_points
 from contfric.response.outcome import Outcome
 from contfric.response.sections import SectionLike, section_of, usual_section
 from contfric.response.sweep import Sweep, SweepRun
@@ -91,7 +90,7 @@ def sweep(
 
     At each value the solution goes on from the state at the value before. Its points on the section are
     collected after a transient. One that repeats itself to rounding is left at once, and has the points
-    of one period. Where nothing can be carried over (the solution grew, or no solution starts there) the
+    of one period. Where nothing can be carried over (the solution diverged, or no solution starts there) the
     next value begins with the model's start. Ctrl-C ends the computation; what was found is returned.
 
     Parameters
@@ -248,47 +247,35 @@ def _run(job: _SweepJob, direction: str, stretches: Sequence[StretchRows]) -> Sw
     index = [np.empty(0, dtype=np.int64)]
     for part, rows in enumerate(stretches):
         numbers = job.numbers(direction, part)
-        outcomes[numbers], periods[numbers] = rows.outcomes, rows.periods
-        index.append(np.repeat(numbers, np.diff(rows.upto, prepend=0)))
+        outcomes[numbers], periods[numbers] = rows.ends.outcomes, rows.ends.turns
+        index.append(np.repeat(numbers, np.diff(rows.ends.upto, prepend=0)))
     found = np.concatenate(index)
     order = np.argsort(found, kind="stable")
-
-    def joined(name: str, like: Any) -> Any:
-        arrays = [getattr(rows, name) for rows in stretches]
-        return np.concatenate([like, *arrays])[order]
-
-    none = np.empty(0, dtype=np.int64)
+    parts = [empty_points(0, len(job.model.states)), *(rows.points for rows in stretches)]
+    pieces = zip(*(points[1:] for points in parts), strict=True)
+    cycles, modes, times, states = (np.concatenate(rows)[order] for rows in pieces)
     return SweepRun(
         outcomes,
         periods,
         found[order].astype(np.int32),
-        joined("cycles", none).astype(np.int32),
-        joined("modes", none).astype(np.uint8),
-        joined("times", np.empty(0)),
-        joined("states", np.empty((0, len(job.model.states)))),
+        cycles.astype(np.int32),
+        modes.astype(np.uint8),
+        times,
+        states,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class StretchRows:
-    """Results of a stretch, value by value.
+    """Results of a stretch: the points of all values, and what each solution came to."""
 
-    Attributes
-    ----------
-    outcomes, periods, upto : what each solution came to, the periods after which it repeats itself, and the
-        points up to it, shape (values,)
-    cycles, modes, times, states : the points
-    last : state to be carried over, shape (n,)
-    """
+    points: SectionPoints
+    ends: Ends
 
-    outcomes: IntArray
-    periods: IntArray
-    upto: IntArray
-    cycles: IntArray
-    modes: IntArray
-    times: FloatArray
-    states: FloatArray
-    last: FloatArray
+    @property
+    def last(self) -> FloatArray:
+        """State to be carried over, shape (n,)."""
+        return np.asarray(self.ends.states[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,14 +302,4 @@ def compute_stretch(task: Stretch, stop: IntArray | None = None) -> StretchRows:
     count = len(task.vectors)
     free = np.full(count, -1, dtype=np.int64)
     starts = np.zeros(count), task.state[None], free, np.zeros(count, dtype=np.int64)
-    points, ends = collect(task.model, task.cut, task.how, task.vectors, starts, stop)
-    return StretchRows(
-        ends.outcomes,
-        ends.turns,
-        ends.upto,
-        points.cycles,
-        points.modes,
-        points.times,
-        points.states,
-        ends.states[-1].copy(),
-    )
+    return StretchRows(*collect(task.model, task.cut, task.how, task.vectors, starts, stop))

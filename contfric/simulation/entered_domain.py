@@ -19,6 +19,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.base.attributes import kept
 from contfric.models.definition import Domain, Model, Surface
 from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
@@ -52,21 +53,18 @@ class StartState:
         """How far the state is above each surface that there is by now."""
         return {surface.name: self._height(surface) for surface in self.model.surfaces}
 
-    @cached_property
-    def _values(self) -> dict[str, float]:
-        return {}
+    @kept
+    def _observed(self, observable: str) -> float:
+        return self._view.observe(observable, self.t, self.y)
 
-    @cached_property
-    def _terms(self) -> dict[str, float]:
-        return {}
+    @kept
+    def _terms(self, observable: str) -> float:
+        """Return how large the terms are that an observable is summed up from."""
+        return float(np.abs(self._view.gradient(observable, self.t, self.y)) @ self._widths)
 
     def _height(self, surface: Surface) -> float:
         """Return how far the state is above a surface, one of a mode that was visited just now, too."""
-        found = self._values.get(surface.observable)
-        if found is None:
-            found = self._view.observe(surface.observable, self.t, self.y)
-            self._values[surface.observable] = found
-        return found - self._view.level(surface.name)
+        return self._observed(surface.observable) - self._view.level(surface.name)
 
     @cached_property
     def _widths(self) -> FloatArray:
@@ -87,11 +85,7 @@ class StartState:
 
     def _size(self, surface: Surface) -> float:
         """Return what the height over a surface is summed up from: its rounding is relative to that."""
-        found = self._terms.get(surface.observable)
-        if found is None:
-            terms = self._view.gradient(surface.observable, self.t, self.y)
-            found = self._terms[surface.observable] = float(np.abs(terms) @ self._widths)
-        return abs(self._view.level(surface.name)) + found
+        return abs(self._view.level(surface.name)) + self._terms(surface.observable)
 
     def lies_on(self, name: str) -> bool:
         """Tell whether the state lies on a surface, but for rounding."""
@@ -101,7 +95,7 @@ class StartState:
     def side_ahead(self, mode: str, name: str) -> int:
         """Return the side of a surface that the solution of a mode leads to; 0 if it stays on it."""
         surface = self.model.surface_by_name[name]
-        here = self._view.observe(surface.observable, self.t, self.y)
+        here = self._observed(surface.observable)
         least = _MOVED * self._size(surface)
         for step in (share * self._unit for share in _STEPS):
             later = self._view.state(mode, self.t, self.y, step)

@@ -28,7 +28,7 @@ _DRAWN = 3
 #: States that are drawn where none of these is: enough to hit a region of a hundredth of the spread, which
 #: nobody may have written, and then further out.
 _DRAWS, _WIDER = 1000, (1.0, 3.0, 10.0, 100.0)
-#: A state this far behind a surface, relative to 1 + the states, is not on it by rounding.
+#: A state this far beyond a surface, relative to 1 + the states, is not on it by rounding.
 _OUTSIDE = 1e-6
 #: Surfaces that an error names: more are no line to read.
 _SURFACES_SHOWN = 8

@@ -1,8 +1,7 @@
 """Compiled values and derivatives against the formulas themselves.
 
 The formulas of a described model are evaluated in 60 digits, straight from their text, and differentiated by
-differences: neither sympy nor the generated code takes part. A model without a description is held against
-differences of its own compiled functions, in ordinary numbers.
+differences: neither sympy nor the generated code takes part.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from typing import Any
 
 import mpmath
@@ -24,6 +23,7 @@ from contfric.models.definition import Model
 from contfric.models.described.description import Description
 from contfric.models.described.evaluate import Evaluator
 from contfric.models.language.grammar import UNARY, Algebra
+from contfric.models.tied import declaration
 
 #: States per function: a wrong formula is wrong almost everywhere.
 _STATES = 5
@@ -31,8 +31,6 @@ _STATES = 5
 _INNER, _OUTER = mpmath.mpf(10) ** -18, mpmath.mpf(10) ** -9
 #: Rounding of compiled formulas, relative to the largest number among those compared.
 _SAME = 1e-9
-#: The same for differences in ordinary numbers, and their step (the cube root of the rounding error).
-_COARSE, _COARSE_STEP = 1e-5, 6e-6
 
 Jacobian = tuple[FloatArray, FloatArray]
 Compiled = Callable[[FloatArray], Jacobian]
@@ -64,28 +62,25 @@ class Case:
 
     ``compiled`` returns values (m,) and derivatives (m, variables) at a point; ``formula`` the values.
     ``mode`` is the mode whose states it is compared at, None for all states. ``names`` are those that the
-    formula depends on, in any way; all, if nothing is known.
+    formula depends on, in any way.
     """
 
     what: str
     compiled: Compiled
     formula: Formula
+    names: frozenset[str]
     mode: str | None = None
     step: Any = _INNER
-    names: frozenset[str] | None = None
 
 
 def check_derivatives(report: ModelReport, probe: Probe) -> None:
-    """Compare every compiled function with its formula, or with its own differences."""
+    """Compare every compiled function with its formula; of a model without formulas only rates."""
     model = probe.model
     near = Probe(model, _nearby(model, probe))
     points = cache(lambda mode: list(_points(near, mode)))  # looked for among many states
     _rates_along(report, near, points)
     for case in _cases(near):
-        has_value = [
-            _compare(report, model, case, point, bool(model.definition))
-            for point in points(case.mode)
-        ]
+        has_value = [_compare(report, model, case, point) for point in points(case.mode)]
         if not all(has_value):
             report.warn(
                 Topic.DERIVATIVES,
@@ -135,37 +130,25 @@ def _points(probe: Probe, mode: str | None) -> Iterator[FloatArray]:
         yield np.array([t, *y, *probe.vector])
 
 
-def _compare(
-    report: ModelReport, model: Model, case: Case, point: FloatArray, described: bool
-) -> bool:
+def _compare(report: ModelReport, model: Model, case: Case, point: FloatArray) -> bool:
     """Compare at one point; return whether the formula has a value there."""
     names = ["t", *model.states, *model.parameter_names]
     values, jac = case.compiled(point)
-    if described:
-        with mpmath.workdps(DIGITS):
-            place = [mpmath.mpf(float(x)) for x in point]
-            try:
-                exact = np.array([float(v) for v in case.formula(place)])
-                # relative to a small variable: an inertia of 1e-5, a capacity
-                steps = [case.step * (min(1, abs(x)) or 1) for x in place]
-                own = [
-                    i for i, name in enumerate(names) if case.names is None or name in case.names
-                ]
-                slope = np.zeros((len(exact), len(point)))
-                if own:  # by what does not occur the derivative is 0
-                    slope[:, own] = np.array(
-                        slopes(case.formula, place, steps, own), dtype=np.float64
-                    )
-            except (TypeError, ValueError, ArithmeticError):
-                return False
-    else:
-        exact = values
-        steps = [_COARSE_STEP] * len(point)
-        slope = np.array(slopes(lambda p: list(case.compiled(np.array(p))[0]), list(point), steps))
-    tolerance = _SAME if described else _COARSE
+    with mpmath.workdps(DIGITS):
+        place = [mpmath.mpf(float(x)) for x in point]
+        try:
+            exact = np.array([float(v) for v in case.formula(place)])
+            # relative to a small variable: an inertia of 1e-5, a capacity
+            steps = [case.step * (min(1, abs(x)) or 1) for x in place]
+            own = [i for i, name in enumerate(names) if name in case.names]
+            slope = np.zeros((len(exact), len(point)))
+            if own:  # by what does not occur the derivative is 0
+                slope[:, own] = np.array(slopes(case.formula, place, steps, own), dtype=np.float64)
+        except (TypeError, ValueError, ArithmeticError):
+            return False
     scale = 1.0 + max(np.abs(exact).max(), np.abs(slope).max())
     report.count(Topic.DERIVATIVES)
-    wrong = np.abs(values - exact) > tolerance * scale
+    wrong = np.abs(values - exact) > _SAME * scale
     if wrong.any() or not np.isfinite(values).all():
         report.error(
             Topic.DERIVATIVES,
@@ -173,7 +156,7 @@ def _compare(
             f"{_shown(names, point)}",
         )
         return True
-    off = ~(np.abs(jac - slope) <= tolerance * scale)
+    off = ~(np.abs(jac - slope) <= _SAME * scale)
     if off.any():
         row, column = (int(i) for i in np.argwhere(off)[0])
         report.error(
@@ -192,41 +175,36 @@ def _shown(names: list[str], point: FloatArray) -> str:
 
 
 def _cases(probe: Probe) -> list[Case]:
-    """Return the compiled functions of a model, each with its formula where the model has any."""
-    model = probe.model
-    flow, ends = model.flow, model.surfaces
-    cases = _Described(model) if model.definition else _Cases(model)
-    found = [
-        Case(
-            f"observable '{o.name}'",
-            cases.scalar(flow.observe, c),
-            cases.observable(o.name),
-            names=cases.names_of_observable(o.name),
-        )
-        for c, o in enumerate(model.observables)
-    ]
+    """Return the compiled functions of a model, each with its formula; none of a model without formulas."""
+    model, declared = probe.model, declaration(probe.model)
+    if declared is None:
+        return []
+    flow, ends, cases = model.flow, model.surfaces, _Cases(model, declared.description)
+    found = []
+    for c, o in enumerate(model.observables):
+        compiled, names = cases.scalar(flow.observe, c), cases.names_of_observable(o.name)
+        found.append(Case(f"observable '{o.name}'", compiled, cases.observable(o.name), names))
     for m, mode in enumerate(model.modes):
         found += cases.field(m, mode.name)
         for c, o in enumerate(model.observables):
             what, rate = f"rate of '{o.name}' in mode '{mode.name}'", cases.scalar(flow.rate, m, c)
             formula, names = cases.rate(mode.name, o.name), cases.names_of_rate(mode.name, o.name)
-            found.append(Case(what, rate, formula, mode.name, _OUTER, names))
+            found.append(Case(what, rate, formula, names, mode.name, _OUTER))
     found += [reset for k, surface in enumerate(ends) for reset in cases.reset(k, surface.name)]
-    for k, surface in enumerate(ends):
-        what, level = f"level of surface '{surface.name}'", cases.of_parameters(flow.level, k)
-        found.append(
-            Case(what, level, cases.value(surface.level), names=cases.names(surface.level))
-        )
-    period = cases.of_parameters(flow.period), cases.value(cases.period)
-    return [*found, Case("period", *period, names=cases.names(cases.period))]
+    for k, s in enumerate(ends):
+        found.append(cases.of_parameters(f"level of surface '{s.name}'", s.level, flow.level, k))
+    period = cases.description.period or "0"
+    return [*found, cases.of_parameters("period", period, flow.period)]
 
 
-@dataclass(eq=False)
 class _Cases:
-    """Points taken apart, and compiled functions put together again; there are no formulas."""
+    """Points taken apart, compiled functions put together again, and formulas in many digits."""
 
-    model: Model
-    period: str = ""
+    def __init__(self, model: Model, description: Description) -> None:
+        self.model, self.description = model, description
+        self.exact = digits(description)
+        # the rates of all observables of a mode need the same fields
+        self._fields = lru_cache(maxsize=_KEPT)(self._field_at)
 
     @property
     def every(self) -> Any:
@@ -258,8 +236,10 @@ class _Cases:
 
         return compiled
 
-    def of_parameters(self, function: Callable[..., float], *index: int) -> Compiled:
-        """``function(*index, p, which, grad)`` as a vector function of one value."""
+    def of_parameters(
+        self, what: str, text: str, function: Callable[..., float], *index: int
+    ) -> Case:
+        """Return ``function(*index, p, which, grad)`` with its formula."""
 
         def compiled(point: FloatArray) -> Jacobian:
             grad = np.zeros(len(point))
@@ -268,43 +248,10 @@ class _Cases:
             grad[len(point) - len(own) :] = own
             return np.array([value]), grad[None, :]
 
-        return compiled
+        def formula(point: list[Any]) -> list[Any]:
+            return [self.exact.value(text, self._at(point)[0])]
 
-    def names(self, *texts: str) -> frozenset[str] | None:
-        """Return the names that some expressions depend on; None where nothing is known."""
-        return None
-
-    def names_of_observable(self, name: str) -> frozenset[str] | None:
-        return None
-
-    def names_of_rate(self, mode: str, observable: str) -> frozenset[str] | None:
-        return None
-
-    def observable(self, name: str) -> Formula:
-        return list
-
-    def rate(self, mode: str, observable: str) -> Formula:
-        return list
-
-    def value(self, text: str) -> Formula:
-        return list
-
-    def field(self, m: int, mode: str) -> list[Case]:
-        return []
-
-    def reset(self, k: int, surface: str) -> list[Case]:
-        return []
-
-
-class _Described(_Cases):
-    """The same with the formulas of a description, in many digits."""
-
-    def __init__(self, model: Model) -> None:
-        self.description = model.description
-        super().__init__(model, self.description.period or "0")
-        self.exact = digits(self.description)
-        # the rates of all observables of a mode need the same fields
-        self._fields = lru_cache(maxsize=_KEPT)(self._field_at)
+        return Case(what, compiled, formula, self.names(text))
 
     def _at(self, point: Any) -> tuple[dict[str, Any], Any, Any]:
         t, y, p = self.parts(point)
@@ -339,17 +286,13 @@ class _Described(_Cases):
 
         return formula
 
-    def value(self, text: str) -> Formula:
-        return lambda point: [self.exact.value(text, self._at(point)[0])]
-
     def field(self, m: int, mode: str) -> list[Case]:
+        if not self.model.definition:  # its flow has no function for it
+            return []
         compiled = self.vector(field_of(self.model), m)
         names = self.names(*self.exact.rates_of(mode))
-        formula = partial(self._field_from, mode)
-        return [Case(f"field of mode '{mode}'", compiled, formula, mode, names=names)]
-
-    def _field_from(self, mode: str, point: list[Any]) -> list[Any]:
-        return self._field_at(mode, *point)
+        what, formula = f"field of mode '{mode}'", lambda point: self._field_at(mode, *point)
+        return [Case(what, compiled, formula, names, mode)]
 
     def reset(self, k: int, surface: str) -> list[Case]:
         if surface not in self.description.resets:
@@ -362,7 +305,7 @@ class _Described(_Cases):
 
         compiled = self.vector(self.model.flow.reset, k)
         names = self.names(*(texts.get(s, s) for s in self.model.states))
-        return [Case(f"reset at '{surface}'", compiled, formula, names=names)]
+        return [Case(f"reset at '{surface}'", compiled, formula, names)]
 
 
 def digits(description: Description) -> Evaluator[Any]:

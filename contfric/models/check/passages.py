@@ -19,7 +19,7 @@ _DRAWN, _ASKED = 200, 20
 
 
 def check_passages(report: ModelReport, probe: Probe) -> None:
-    """Warn of modes that end at a surface whose reset acts in other modes only, with nothing behind it."""
+    """Warn of modes that end at a surface whose reset acts in other modes only, with nothing beyond it."""
     for surface in probe.model.reset_by_surface:
         if mode := _ending(probe, surface):
             acts = " or ".join(probe.model.reset_by_surface[surface].modes)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from contfric.base.arrays import FloatArray
+from contfric.base.attributes import kept
 from contfric.models.definition import Model
 from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.view import FlowView
@@ -166,29 +167,21 @@ class Probe:
 
     def on_all(self, surfaces: tuple[str, ...], count: int) -> Iterator[Place]:
         """Yield times and states on some surfaces, near so many states."""
-        return self._found(("surfaces", *surfaces), partial(self.landed, surfaces), count)
+        yield from _copied(self._on(surfaces).first(count))
 
-    def _found(
-        self,
-        key: tuple[str, ...],
-        near: Callable[[float, FloatArray], Place | None],
-        count: int,
-    ) -> Iterator[Place]:
-        """Yield what is found near the first states; each is asked for once, whatever looks there again."""
-        if key not in self._known:
-            self._known[key] = Prefix(near(t, y.copy()) for t, y in self._drawn.first())
-        for place in self._known[key].first(count):
-            if place is not None:
-                yield place[0], place[1].copy()
+    @kept
+    def _on(self, surfaces: tuple[str, ...]) -> Prefix[Place | None]:
+        """Return what is found on some surfaces near the first states, each asked for once."""
+        return Prefix(self.landed(surfaces, t, y.copy()) for t, y in self._drawn.first())
 
-    @cached_property
-    def _known(self) -> dict[tuple[str, ...], Prefix[Place | None]]:
-        return {}
+    @kept
+    def _inside(self, mode: str) -> Prefix[Place | None]:
+        """Return the same inside of a mode."""
+        return Prefix(self.inside(mode, t, y.copy()) for t, y in self._drawn.first())
 
     def places(self, mode: str, drawn: int, most: int | None = None) -> Iterator[Place]:
         """Yield places of a mode, at most so many, near states of which so many are drawn."""
-        found = self._found(("mode", mode), partial(self.inside, mode), drawn)
-        yield from itertools.islice(found, most)
+        yield from itertools.islice(_copied(self._inside(mode).first(drawn)), most)
 
     def shown(self, t: float, y: FloatArray) -> str:
         """Return a time and a state in words; no time where nothing depends on it."""
@@ -262,6 +255,11 @@ class Prefix(Generic[T]):
             if k == len(self._known):
                 self._known.append(next(self._elements))
             yield self._known[k]
+
+
+def _copied(places: Iterable[Place | None]) -> Iterator[Place]:
+    """Yield copies of the places that there are."""
+    return ((place[0], place[1].copy()) for place in places if place is not None)
 
 
 def _shortest(slopes: FloatArray, heights: FloatArray) -> tuple[FloatArray, int]:

@@ -33,6 +33,7 @@ from contfric.models.described.regions import domains_of, is_possible, ordered_s
 from contfric.models.entries import EntryError
 from contfric.models.generated.build import GeneratedFlow
 from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Scope, parse
+from contfric.models.language.linear import linear_form
 from contfric.models.parts import Constraint, Departure, Mode, Symmetry
 
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
@@ -196,28 +197,17 @@ def _mode(description: Description, name: str) -> Mode:
 def constraint_of(address: Address, text: str, why: str, params: Mapping[str, float]) -> Constraint:
     """Read ``S0 >= S``: the difference of both sides, linear in the parameters."""
     tree = _comparison(address, text)
-    sign = 1.0 if isinstance(tree.ops[0], (ast.Gt, ast.GtE)) else -1.0
-    names = sorted(params)
-
-    def difference(values: Mapping[str, float]) -> float:
-        scope = Scope(FLOATS, dict(values))
-        return sign * (scope.evaluate(tree.left) - scope.evaluate(tree.comparators[0]))
-
+    above = isinstance(tree.ops[0], (ast.Gt, ast.GtE))
+    sides = (tree.left, tree.comparators[0]) if above else (tree.comparators[0], tree.left)
     try:
-        zero = dict.fromkeys(names, 0.0)
-        constant = difference(zero)
-        slopes = {name: difference({**zero, name: 1.0}) - constant for name in names}
-        for stretch in (0.5, 2.0, -3.0):
-            point = {name: stretch * (1.0 + i) for i, name in enumerate(names)}
-            linear = constant + sum(slopes[name] * point[name] for name in names)
-            if not abs(difference(point) - linear) <= _SAME * (1.0 + abs(linear)):
-                raise ArithmeticError
-    except ArithmeticError:
-        raise EntryError(
-            address, f"'{text}' must be linear in the parameters, such as S0 >= S or Omega > 0"
-        ) from None
+        found = linear_form(ast.BinOp(sides[0], ast.Sub(), sides[1]), sorted(params))
     except ModelError as error:
         raise EntryError(address, f"'{text}': {error}") from None
+    if found is None:
+        raise EntryError(
+            address, f"'{text}' must be linear in the parameters, such as S0 >= S or Omega > 0"
+        )
+    constant, slopes = found
     coefficients = {name: slope for name, slope in slopes.items() if slope != 0.0}
     strict = isinstance(tree.ops[0], (ast.Gt, ast.Lt))
     return Constraint(text, coefficients, strict, why, constant)

@@ -158,7 +158,7 @@ class ComposedModel(Model):
         return place
 
     def mode_order(self, name: str) -> int:
-        """Return the place of a mode in words that are compared: the same whatever was visited."""
+        """Return the place of a mode in itineraries that are compared: the same whatever was visited."""
         return self.composition.order(name)
 
     def domain_order(self, name: str) -> int:

@@ -135,7 +135,9 @@ class Landing:
         if own and one_sided:
             return 1  # a wall that some states still run into: `contfric check` says where
         if passed and any(verdicts[side] for side in (1, -1)):
-            return max((1, -1), key=verdicts.__getitem__)  # the mode behind passes it: a label
+            return max(
+                (1, -1), key=verdicts.__getitem__
+            )  # the mode after the reset passes it: a label
         if any(self.surface in wraps_of(a) for a in self.sampler.evaluator.description.angles):
             raise EntryError(
                 ("angles",),
@@ -219,7 +221,7 @@ class Landing:
         return frozenset(found)
 
     def _is_label(self, surface: str, behind: Sequence[Domain]) -> bool:
-        """Tell whether one mode is behind, on both sides of a surface: motion passes it there unchanged."""
+        """Tell whether one mode follows, on both sides of a surface: solutions pass it there unchanged."""
         modes = {d.mode for d in behind}
         sides = {d.signs[surface] for d in self.domains if d.mode in modes}
         return len(modes) == 1 and sides >= {1, -1}

@@ -23,6 +23,7 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from contfric.base.attributes import kept
 from contfric.errors import ModelError
 from contfric.models.deriving.measuring import proportional
 from contfric.models.deriving.sections import has_kinks, joined_modes
@@ -253,7 +254,6 @@ class PhaseParts:
 
     def __init__(self, acting: Sequence[Contact], coordinates: int, surface: str) -> None:
         self._acting, self._coordinates, self._surface = acting, coordinates, surface
-        self._divided: dict[str, bool] = {}
 
     def whole(self, name: str) -> str:
         """Return the mode that a mode is a part of, most often itself."""
@@ -261,10 +261,7 @@ class PhaseParts:
 
     def is_divided(self, name: str) -> bool:
         """Tell whether the phase divides a mode: one in which an orbit may stay."""
-        whole = self.whole(name)
-        if whole not in self._divided:
-            self._divided[whole] = bool(self._surface) and self._may_stay(whole)
-        return self._divided[whole]
+        return bool(self._surface) and self._may_stay(self.whole(name))
 
     def part(self, name: str, side: int) -> str:
         """Return the part of a mode on one side of the phase; the mode itself if that is not divided."""
@@ -275,6 +272,7 @@ class PhaseParts:
         """Return the side of the phase that a part of a mode lies on; 0 of a mode that is not divided."""
         return (-1 if name.endswith(PART) else 1) * self.is_divided(name)
 
+    @kept
     def _may_stay(self, whole: str) -> bool:
         """Tell whether something moves in a mode, and no contact slides to one side for ever.
 

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
+from contfric.base.attributes import kept
 from contfric.models.deriving.phases import PART, PhaseParts
 from contfric.models.described.description import ModeText
 from contfric.models.described.reading_back import from_text
@@ -70,10 +71,8 @@ class Composition:
         self._description = description
         self._parts = Combinations(structure)
         self.acting = [c for c in structure.contacts if c.states]
-        self._sides: dict[str, dict[str, int]] = {}
         self._places: dict[str, int] = {}
         self._ways: dict[str, dict[str, tuple[Way, ...]]] = {}
-        self._limits: dict[str, Limit | None] = {}
         self.declared = frozenset(s.name for s in description.surfaces)
         self.parts = PhaseParts(self.acting, len(self.structure.coordinates), description.phase)
         self.phase = description.phase
@@ -106,12 +105,11 @@ class Composition:
             c.name: letter for c, letter in zip(self.acting, self.parts.whole(name), strict=True)
         }
 
+    @kept
     def sides(self, name: str) -> dict[str, int]:
         """Return the sides of the surfaces that matter to a mode."""
-        if name not in self._sides:
-            found = self._parts.sides(self.states_in(name))
-            self._sides[name] = {surface: SIDES[side] for surface, side in found.items()}
-        return self._sides[name]
+        found = self._parts.sides(self.states_in(name))
+        return {surface: SIDES[side] for surface, side in found.items()}
 
     def mode(self, name: str) -> Mode:
         """Return a mode; it forgets a direction for each surface that it moves on."""
@@ -147,11 +145,10 @@ class Composition:
         """Tell whether a contact shares its load with others."""
         return self.structure.loads.couples(contact)
 
+    @kept
     def limit(self, surface: str) -> Limit | None:
         """Return the limit of a shared load that a surface is; None if it is not one."""
-        if surface not in self._limits:
-            self._limits[surface] = self.structure.loads.limit(surface)
-        return self._limits[surface]
+        return self.structure.loads.limit(surface)
 
     def surface(self, name: str) -> tuple[Surface, str]:
         """Return a surface that is the limit of a shared load, and the formula of its observable."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from contfric.base.attributes import kept
 from contfric.models.entries import EntryError
 from contfric.models.language.grammar import FLOATS, PERIOD, TIME, Algebra, parse
 from contfric.models.language.python_code import Function, function_of
@@ -36,10 +38,6 @@ class Evaluator(Generic[T]):
     algebra: Algebra[T]
 
     @cached_property
-    def _trees(self) -> dict[str, object]:
-        return {}
-
-    @cached_property
     def _observable(self) -> dict[str, str]:
         return {o.name: o.formula for o in self.description.observables}
 
@@ -59,13 +57,11 @@ class Evaluator(Generic[T]):
         if t is not None:
             values[TIME] = t
         values.update(zip(self.description.states, y, strict=False))
-        tree = self._tree(text)
-        return self.description.names.scope(self.algebra, values).evaluate(tree)  # type: ignore[arg-type]
+        return self.description.names.scope(self.algebra, values).evaluate(self._tree(text))
 
-    def _tree(self, text: str) -> object:
-        if text not in self._trees:
-            self._trees[text] = parse(text)
-        return self._trees[text]
+    @kept
+    def _tree(self, text: str) -> ast.expr:
+        return parse(text)
 
     def formula_of(self, observable: str) -> str:
         """Return the expression of an observable."""
@@ -79,15 +75,10 @@ class Evaluator(Generic[T]):
         """Return the value of an observable."""
         return self.value(self._observable[name], params, t, y)
 
-    @cached_property
-    def _quick(self) -> dict[str, Function]:
-        return {}
-
+    @kept
     def _function(self, text: str) -> Function:
         """Return an expression as a function of ordinary numbers."""
-        if text not in self._quick:
-            self._quick[text] = function_of(self.description.names, text)
-        return self._quick[text]
+        return function_of(self.description.names, text)
 
     def height(self, surface: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> T:
         """Return (observable - level) of a surface."""
@@ -98,19 +89,13 @@ class Evaluator(Generic[T]):
         above = self.observable(observable, params, t, y)
         return above - self.value(level, params)  # type: ignore[operator,no-any-return]
 
+    @kept
     def moving(self, surface: str) -> tuple[int, ...]:
         """Return which of time (0) and states (from 1) the observable of a surface depends on."""
         observable, _ = self._surface[surface]
-        if observable not in self._moving:
-            description = self.description
-            leaves = description.names.leaves_of(self._observable[observable])
-            names = (TIME, *description.states)
-            self._moving[observable] = tuple(i for i, name in enumerate(names) if name in leaves)
-        return self._moving[observable]
-
-    @cached_property
-    def _moving(self) -> dict[str, tuple[int, ...]]:
-        return {}
+        leaves = self.description.names.leaves_of(self._observable[observable])
+        names = (TIME, *self.description.states)
+        return tuple(i for i, name in enumerate(names) if name in leaves)
 
     def field(self, mode: str, params: Mapping[str, T], t: T, y: Sequence[T]) -> list[T]:
         """Return the rates of all states in a mode."""

@@ -18,17 +18,17 @@ from sympy.printing.pycode import PythonCodePrinter
 VALUES, SLOPES = -2, -1
 
 
+#: Functions of the language that Python does not have, or under another name.
+_FUNCTIONS = {"Abs": "abs", "Sign": "sign", "Power": "power", "PowerLog": "power_log"}
+
+
 class Printer(PythonCodePrinter):  # type: ignore[misc]
     """Prints formulas as scalar Python in floating point."""
 
-    def _print_Integer(self, expr: Any) -> str:
-        return repr(float(expr))
-
-    def _print_Rational(self, expr: Any) -> str:
-        return repr(float(expr))
-
     def _print_Float(self, expr: Any) -> str:
         return repr(float(expr))
+
+    _print_Integer = _print_Rational = _print_Float
 
     def _print_Pow(self, expr: Any, rational: bool = False, sqrt: str = "math.sqrt") -> str:
         base, exponent = expr.base, expr.exp
@@ -42,28 +42,15 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
             return f"({power})" if exponent > 0 else f"(1.0 / {power})"
         return f"({inner} ** ({self._print(exponent)}))"
 
-    def _print_Sign(self, expr: Any) -> str:
-        return f"sign({self._print(expr.args[0])})"
-
-    def _print_Abs(self, expr: Any) -> str:
-        return f"abs({self._print(expr.args[0])})"
-
     def _print_Where(self, expr: Any) -> str:
         d, a, b = (self._print(arg) for arg in expr.args)
         return f"(({a}) if ({d}) > 0.0 else ({b}))"
 
-    def _print_Power(self, expr: Any) -> str:
-        b, e = (self._print(arg) for arg in expr.args)
-        return f"power({b}, {e})"
-
-    def _print_PowerLog(self, expr: Any) -> str:
-        b, e = (self._print(arg) for arg in expr.args)
-        return f"power_log({b}, {e})"
-
 
 def printed(expression: Any) -> str:
     """Return a formula as Python."""
-    return str(Printer({"fully_qualified_modules": True}).doprint(expression))
+    settings = {"fully_qualified_modules": True, "user_functions": _FUNCTIONS}
+    return str(Printer(settings).doprint(expression))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
+from contfric.base.attributes import kept
 from contfric.models.described.description import Description, ModeText
 from contfric.models.described.reading_back import from_text
 from contfric.models.described.regions import engine_order, known_sides
@@ -55,7 +56,6 @@ class Forms:
         names = tuple(p.name for p in description.parameters)
         self._symbols = symbols(description.states, names)
         self._scope = description.names.scope(AFFINE, self._symbols)
-        self._read: dict[str, Affine] = {}
         states, surfaces = description.states, engine_order(description)
         self.surfaces, self.seen = surfaces, list(description.observables)
         self.observables = [self.form(o.formula) for o in description.observables]
@@ -73,14 +73,14 @@ class Forms:
         }
 
     def add(self, mode: ModeText, named: Mapping[str, str]) -> None:
-        """Read the rates in a mode, which comes behind those that are known; they use named expressions."""
+        """Read the rates in a mode, which comes after those that are known; they use named expressions."""
         for name, text in named.items():
             self._scope.values[name] = self.form(text)
         self.modes.append(mode)
         self.fields.append(self._field(mode))
 
     def see(self, surface: Surface, formula: str) -> bool:
-        """Read a surface that comes behind those that are known; tell whether its observable is new."""
+        """Read a surface that comes after those that are known; tell whether its observable is new."""
         names = [o.name for o in self.seen]
         self.surfaces.append(surface)
         self.levels.append(self._constant(surface.level))
@@ -90,11 +90,10 @@ class Forms:
         self.observables.append(self.form(formula))
         return True
 
+    @kept
     def form(self, text: str) -> Affine:
         """Return an expression as an affine form; the same text is read once."""
-        if text not in self._read:
-            self._read[text] = checked(self._scope.evaluate(parse(text)))
-        return self._read[text]
+        return checked(self._scope.evaluate(parse(text)))
 
     def _field(self, mode: ModeText) -> Form:
         """Return the rates in a mode; on its sides of surfaces signs are known."""

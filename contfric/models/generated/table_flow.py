@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from contfric.flow.interface import CompiledFlow
     from contfric.handle import Block, Bound
 
-#: Modes and observables that there is room for at first; both are doubled where they are more.
-_ROOM = 64
+#: Modes and observables that the table has space for at first; either is doubled when it is full.
+_SPACE = 64
 
 
 class CodedFlow:
@@ -51,7 +51,7 @@ class CodedFlow:
         self._period = tables.value(forms.period)
         self._most = tables.most(range(len(data["places"]) - 1))
         self._slides: list[bool] = []
-        self._idle = np.zeros((_ROOM, _ROOM), dtype=np.int64)  # modes, observables
+        self._idle = np.zeros((_SPACE, _SPACE), dtype=np.int64)  # modes, observables
         for mode in range(len(forms.fields)):
             self._write(mode)
 

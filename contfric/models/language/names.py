@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
+from contfric.base.attributes import kept
 from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError, did_you_mean
 from contfric.models.entries import EntryError
@@ -112,6 +113,7 @@ class Names:
         if PERIOD in found and PERIOD not in (*self.states, *self.parameters):
             raise EntryError(address, "the period T can only stand in the symmetry")
 
+    @kept
     def leaves_of(self, text: str) -> frozenset[str]:
         """Return the states, parameters and t that an expression depends on; each text is read once.
 
@@ -122,13 +124,7 @@ class Names:
         ModelError
             If it is no expression, or for a name that is not known.
         """
-        if text not in self._leaves:
-            self._leaves[text] = frozenset(self.leaves(parse(text), ()))
-        return self._leaves[text]
-
-    @cached_property
-    def _leaves(self) -> dict[str, frozenset[str]]:
-        return {}
+        return frozenset(self.leaves(parse(text), ()))
 
     def leaves(self, tree: ast.expr, above: tuple[str, ...]) -> set[str]:
         """Return the states, parameters and t that an expression depends on."""
@@ -149,8 +145,9 @@ class Names:
 
     def scope(self, algebra: Algebra[T], values: Mapping[str, T]) -> Scope[T]:
         """Return the scope of all names, with the values of states, parameters and t."""
-        return Scope(algebra, dict(values), self._trees)
+        return Scope(algebra, dict(values), self.trees)
 
     @cached_property
-    def _trees(self) -> dict[str, ast.expr]:
+    def trees(self) -> dict[str, ast.expr]:
+        """The expressions of all named parts, read."""
         return {name: parse(text) for name, text in self.parts.items()}

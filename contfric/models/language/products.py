@@ -26,7 +26,7 @@ def of_product(scope: Scope[T], function: Callable[[T], T], node: ast.expr) -> T
 
 
 def difference(scope: Scope[T], left: ast.expr, right: ast.expr) -> T:
-    """Return ``left - right``, of which a condition asks the sign; of a product beside 0, its sign."""
+    """Return ``left - right``, of which a condition asks the sign; of a product compared with 0, its sign."""
     if _is_zero(right) and len(factors(left, scope.defines)) > 1:
         return of_product(scope, scope.algebra.functions["sign"], left)
     if _is_zero(left) and len(factors(right, scope.defines)) > 1:

@@ -155,20 +155,20 @@ class SectionMaps:
         others = {d.own_mode for d in self.domains if self.shown(d.name) != d.name}
         return frozenset(others - {d.own_mode for d in self.domains if d.signs[self.phase] > 0})
 
-    def without_phase(self, walk: Sequence[str]) -> list[str]:
-        """Return a cyclic walk as labels show it; as it is where it has joints at the phase."""
+    def without_phase(self, cycle: Sequence[str]) -> list[str]:
+        """Return a cycle of domains as labels show it; as it is where it has joints at the phase."""
         if not self.phase:
-            return list(walk)
-        ends = zip(walk, (*walk[1:], *walk[:1]), strict=True)
+            return list(cycle)
+        ends = zip(cycle, (*cycle[1:], *cycle[:1]), strict=True)
         if any(a != b and self.shown(a) == self.shown(b) for a, b in ends):
-            return list(walk)
-        shown = [self.shown(name) for name in walk]
+            return list(cycle)
+        shown = [self.shown(name) for name in cycle]
         # a mode that the phase divides lies on one side of it, and leads to others on that side
-        return list(walk) if self._leads_on(walk) and not self._leads_on(shown) else shown
+        return list(cycle) if self._leads_on(cycle) and not self._leads_on(shown) else shown
 
-    def _leads_on(self, walk: Sequence[str]) -> bool:
-        """Tell whether each domain of a cyclic walk can follow the one before, but for resets and holds."""
-        ends = zip(walk, (*walk[1:], *walk[:1]), strict=True)
+    def _leads_on(self, cycle: Sequence[str]) -> bool:
+        """Tell whether each domain of a cycle can follow the one before, but for resets and holds."""
+        ends = zip(cycle, (*cycle[1:], *cycle[:1]), strict=True)
         known = (pair for pair in ends if all(name in self.domain_by_name for name in pair))
         return all(
             any(b == self.transitions.get(at) or b in self.targets.get(at, ()) for at in exits)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from contfric.base.attributes import kept
 from contfric.errors import ParameterError
 from contfric.models.maps.chatter_maps import ChatterMaps
 from contfric.models.maps.overlapping import nearest, turned_back
@@ -38,7 +39,7 @@ class TransitionMaps(ChatterMaps):
         return False
 
     def mode_order(self, name: str) -> int:
-        """Return the place of a mode in words that are compared."""
+        """Return the place of a mode in itineraries that are compared."""
         return self._mode_places[name]
 
     @cached_property
@@ -82,7 +83,7 @@ class TransitionMaps(ChatterMaps):
         return all(domain.signs.get(surface) == 0 for domain in own)
 
     def rests_on(self, surface: str) -> bool:
-        """Return whether some mode moves on a surface; at rest on a wall a mass is there behind chatter."""
+        """Return whether some mode moves on a surface; at rest on a wall a mass is there after chatter."""
         return any(
             domain.signs[surface] == 0
             for domain in self.domains
@@ -169,7 +170,7 @@ class TransitionMaps(ChatterMaps):
     def _chosen_at(self, domain: Domain, surface: Surface, target: Domain) -> tuple[int, ...]:
         """Return the sides at which it is chosen in which mode motion goes on.
 
-        Motion that turns back at a surface has entered a mode behind it.
+        Motion that turns back at a surface has entered a mode beyond it.
         """
         if not surface.switching and domain.own_mode != target.own_mode:
             through = {**domain.signs, surface.name: -domain.signs[surface.name]}
@@ -195,7 +196,7 @@ class TransitionMaps(ChatterMaps):
         return None if reset is None or (reset.modes and mode not in reset.modes) else reset
 
     def ends_at(self, domain: Domain, surface: str) -> bool:
-        """Return whether motion meets a reset that acts in other modes only, and no mode holds behind it.
+        """Return whether motion meets a reset that acts in other modes only, and no mode holds beyond it.
 
         Motion that a reset does not map passes its surface, as it passes any other.
         """
@@ -220,10 +221,14 @@ class TransitionMaps(ChatterMaps):
         asked = {name: domain.signs[name] for name in self._fixed_by(reset)} | reset.sides
         if reset.surface in reset.sides:
             asked[reset.surface] *= domain.signs[reset.surface]
-        behind = self._domains_landed(reset).get(tuple(asked[name] for name in sorted(asked)), [])
+        behind = self._domains_landed(reset.surface).get(
+            tuple(asked[name] for name in sorted(asked)), []
+        )
         behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
         for sides in self.thrown_off(asked, domain.own_mode):
-            behind += self._domains_landed(reset).get(tuple(sides[n] for n in sorted(sides)), [])
+            behind += self._domains_landed(reset.surface).get(
+                tuple(sides[n] for n in sorted(sides)), []
+            )
         behind = [d for d in behind if not reset.ways or d.name in reset.ways]
         behind = led(behind, reset.leads, domain.own_mode)
         if reset.stays and not reset.changes:  # it only says the mode
@@ -269,22 +274,18 @@ class TransitionMaps(ChatterMaps):
             return set()  # thrown off a wall, or against it: the side a little after tells
         return {s for s, v in domain.signs.items() if v == 0 and not self.changed_by(reset, s)}
 
-    def _domains_landed(self, reset: Reset) -> dict[tuple[int, ...], list[Domain]]:
+    @kept
+    def _domains_landed(self, surface: str) -> dict[tuple[int, ...], list[Domain]]:
         """Return the domains that lie on no surface of what a reset changes, by the sides of all others."""
-        if reset.surface not in self._landed_on:
-            free = [s.name for s in self.surfaces if self.changed_by(reset, s.name)]
-            asked = sorted({*self._fixed_by(reset), *reset.sides})
-            found: dict[tuple[int, ...], list[Domain]] = {}
-            for domain in self.domains:
-                if all(domain.signs[name] != 0 for name in free if reset.lands.get(name) != 0):
-                    key = tuple(domain.signs[name] for name in asked)
-                    found.setdefault(key, []).append(domain)
-            self._landed_on[reset.surface] = found
-        return self._landed_on[reset.surface]
-
-    @cached_property
-    def _landed_on(self) -> dict[str, dict[tuple[int, ...], list[Domain]]]:
-        return {}
+        reset = self.reset_by_surface[surface]
+        free = [s.name for s in self.surfaces if self.changed_by(reset, s.name)]
+        asked = sorted({*self._fixed_by(reset), *reset.sides})
+        found: dict[tuple[int, ...], list[Domain]] = {}
+        for domain in self.domains:
+            if all(domain.signs[name] != 0 for name in free if reset.lands.get(name) != 0):
+                key = tuple(domain.signs[name] for name in asked)
+                found.setdefault(key, []).append(domain)
+        return found
 
     def _next_domain(self, domain: Domain, surface: Surface) -> str | None:
         sign = domain.signs[surface.name]

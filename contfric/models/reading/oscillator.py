@@ -13,6 +13,11 @@ from contfric.models.entries import EntryError
 from contfric.models.language.grammar import TIME
 from contfric.models.reading.files import from_data
 
+#: What a class says as a file does.
+_AS_THEY_ARE = (
+    *("references", "states", "constraints", "domains", "departures", "symmetry", "stop_surface"),
+    *("kinks", "angles", "spread", "integration", "max_step", "quantities", "units"),
+)
 #: Likeness of two names from which one is a slip of the pen: a letter left out, added or exchanged.
 _SLIP = 0.88
 
@@ -161,10 +166,8 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
     data: dict[str, Any] = {
         "name": oscillator.name or kind.__name__,
         "title": (kind.__doc__ or "").strip().partition("\n")[0],
-        "references": list(oscillator.references),
-        "states": list(states),
+        **{key: getattr(oscillator, key) for key in _AS_THEY_ARE},
         "parameters": {n: _parameter(v) for n, v in oscillator.parameters.items()},
-        "constraints": oscillator.constraints,
         "observables": _texts(_traced(oscillator, "observables", t, y, p)),
         "surfaces": {n: _surface(v) for n, v in oscillator.surfaces.items()},
         "modes": {
@@ -179,18 +182,7 @@ def _data(oscillator: OscillatorModel) -> dict[str, Any]:
             }
             for mode, sides in oscillator.modes.items()
         },
-        "domains": dict(oscillator.domains),
-        "departures": list(oscillator.departures),
         "resets": resets,
-        "symmetry": oscillator.symmetry,
-        "stop_surface": oscillator.stop_surface,
-        "kinks": list(oscillator.kinks),
-        "angles": list(oscillator.angles),
-        "spread": dict(oscillator.spread),
-        "integration": dict(oscillator.integration),
-        "max_step": oscillator.max_step,
-        "quantities": dict(oscillator.quantities),
-        "units": units if isinstance(units := oscillator.units, str) else dict(units),
     }
     data.update({"autonomous": True} if period is None else {"period": _text(period)})
     return data

@@ -20,12 +20,14 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from contfric.base.yaml_lines import Address
 from contfric.errors import ModelError
 from contfric.models.described.description import Description
 from contfric.models.described.evaluate import Sampler, defaults, floats
 from contfric.models.entries import AUTO, EntryError, known_keys
 from contfric.models.language.grammar import TIME
 from contfric.models.shorthand.clocks import is_clock
+from contfric.models.shorthand.rewriting import OF_MODES, OTHERS, SHARED, rewritten
 from contfric.models.shorthand.sizes import chosen_units, rounded
 from contfric.models.shorthand.tied import Substitution
 
@@ -94,9 +96,6 @@ def measured(
     def text(expression: Any) -> str:
         return put.text(clock.text(str(expression)))
 
-    def field(rows: Mapping[str, Any]) -> dict[str, str]:
-        return {s: f"({rates.get(s, '1.0')})*({text(row)})" for s, row in rows.items()}
-
     def over(expression: Any, unit: float) -> Any:
         return expression if unit == 1.0 else f"({expression})/{unit!r}"
 
@@ -106,63 +105,36 @@ def measured(
         from_it = f"({expression}) - {origin}" if origin else expression
         return over(from_it, states.get(state, 1.0))
 
-    found = dict(data)
-    for key in ("define", "observables"):
-        found[key] = {n: f if n in data["states"] else text(f) for n, f in data[key].items()}
-    if "field" in data:
-        found["field"] = field(data["field"])
-    found["modes"] = {
-        name: {**mode, "field": field(mode["field"])} if "field" in mode else mode
-        for name, mode in data["modes"].items()
-    }
-    found["surfaces"] = {
-        name: {**s, "level": inside(s["level"], s["observable"])}
-        for name, s in data["surfaces"].items()
-    }
-    found["resets"] = {
-        name: {k: inside(text(v), k) if k in data["states"] else v for k, v in reset.items()}
-        for name, reset in data["resets"].items()
-    }
-    found["spread"] = {
-        s: [inside(end, s) for end in w] if isinstance(w, list) else over(w, states.get(s, 1.0))
-        for s, w in data["spread"].items()
-    }
-    if "period" in data:
-        found["period"] = over(data["period"], time)
-    if "symmetry" in data:
-        found["symmetry"] = {
-            n: image if n == TIME else inside(put.text(image), n)
-            for n, image in data["symmetry"].items()
-        }
+    def rate(expression: Any, address: Address) -> str:
+        return f"({rates.get(str(address[-1]), '1.0')})*({text(expression)})"
+
+    def named(expression: Any, address: Address) -> Any:
+        return expression if address[1] in data["states"] else text(expression)
+
+    def width(expression: Any, address: Address) -> Any:
+        state = str(address[1])
+        is_range = isinstance(data["spread"][state], list)
+        return inside(expression, state) if is_range else over(expression, states.get(state, 1.0))
+
+    def law(expression: Any, address: Address) -> str:
+        found = text(expression)
+        return f"{time!r}*({found})" if str(address[-1]).startswith("power") else found
+
     first = data["states"][0]
     bundled = {name: outside(name, first) for name in ("x_max", "x_min")}
-    return found | _measured(data, text, time, bundled)
-
-
-def _measured(
-    data: Mapping[str, Any],
-    text: Callable[[Any], str],
-    time: float,
-    bundled: Mapping[str, str],
-) -> dict[str, Any]:
-    """Return quantities, and the laws of contacts, in the units of the file."""
-    outside = Substitution(bundled if time == 1.0 else {**bundled, "period": f"({time!r}*period)"})
-    quantities = {
-        name: outside.text(text(q)).replace("integral(", f"{time!r}*integral(")
-        for name, q in data["quantities"].items()
+    own = Substitution(bundled if time == 1.0 else {**bundled, "period": f"({time!r}*period)"})
+    changes: dict[str | int, Callable[[Any, Address], Any]] = {
+        **{"define": named, "observables": named, "field": rate, "modes": rate},
+        "surfaces": lambda e, at: inside(e, data["surfaces"][at[1]]["observable"]),
+        "resets": lambda e, at: inside(text(e), str(at[2])) if at[2] in data["states"] else e,
+        **{"spread": width, "forces": law},
+        "period": lambda e, _: over(e, time),
+        "symmetry": lambda e, at: e if at[1] == TIME else inside(put.text(e), str(at[1])),
+        "quantities": lambda e, _: own.text(text(e)).replace("integral(", f"{time!r}*integral("),
     }
-    forces = {
-        name: {
-            **law,
-            "texts": {
-                k: f"{time!r}*({text(v)})" if k.startswith("power") else text(v)
-                for k, v in law["texts"].items()
-            },
-            **({"rest": text(law["rest"])} if "rest" in law else {}),
-        }
-        for name, law in data["forces"].items()
-    }
-    return {"quantities": quantities, "forces": forces}
+    places = (*SHARED, *OF_MODES, *OTHERS, ("symmetry", None))
+    without = tuple(place for place in places if place[-1] != "at")  # where a contact rests stays
+    return rewritten(data, without, lambda e, address: changes[address[0]](e, address))
 
 
 def _sizes(found: Description) -> dict[str, float]:
@@ -188,32 +160,14 @@ def _observables_in_units(data: dict[str, Any], sizes: Mapping[str, float]) -> d
         return data
     put = Substitution({name: f"({size!r}*{name})" for name, size in sizes.items()})
 
-    def within(value: Any, key: str = "") -> Any:
-        if key in ("to", "from", "in", "mode", "label"):
-            return value
-        if isinstance(value, Mapping):
-            return {k: within(v, k) for k, v in value.items()}
-        return put.text(value) if isinstance(value, str) else value
+    def changed(expression: Any, address: Address) -> Any:
+        key, name = address[:2]
+        if key == "surfaces":
+            name, found = data["surfaces"][name]["observable"], expression
+        else:
+            found = put.text(expression) if isinstance(expression, str) else expression
+        divided = key in ("surfaces", "observables") and name in sizes
+        return f"({found})/{sizes[str(name)]!r}" if divided else found
 
-    found = dict(data)
-    for key in ("define", "field", "resets", "quantities"):
-        if key in data:
-            found[key] = within(data[key])
-    found["modes"] = {
-        name: {**mode, "field": within(mode["field"])} if "field" in mode else mode
-        for name, mode in data["modes"].items()
-    }
-    found["forces"] = {
-        name: {**law, "texts": within(law["texts"])} for name, law in data["forces"].items()
-    }
-    found["observables"] = {
-        name: f"({put.text(formula)})/{sizes[name]!r}" if name in sizes else put.text(formula)
-        for name, formula in data["observables"].items()
-    }
-    found["surfaces"] = {
-        name: {**s, "level": f"({s['level']})/{sizes[s['observable']]!r}"}
-        if s["observable"] in sizes
-        else s
-        for name, s in data["surfaces"].items()
-    }
-    return found
+    others = ("surfaces", None, "level"), ("quantities", None), ("forces", None, "texts", None)
+    return rewritten(data, (*SHARED, *OF_MODES, *others), changed)

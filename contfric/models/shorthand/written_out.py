@@ -49,8 +49,9 @@ def expanded(data: dict[str, Any], read: Callable[[dict[str, Any]], Description]
         data = {**data, **_smooth_mode(data)}
     data = centred(_with_observables(_with_period(with_ties_put_in(data))))
     data, parts = _divided_by_resets(data)
-    walls, data = _chattering(data)
-    surfaces, plain = _derived_sliding(_going_on(with_angles(with_clock(data)), data, parts))
+    walls, data = _asked(data, "resets", "chatter")
+    whole = _going_on(with_angles(with_clock(data)), data, parts)
+    surfaces, plain = _asked(whole, "surfaces", "sliding")
     plain = in_units(plain, read)
     found = read(plain)
     if surfaces:
@@ -210,20 +211,12 @@ def _is_somewhere(sides: Sequence[str], surfaces: Sequence[str], data: Mapping[s
     return all(not (above and below) or max(above) < min(below) for below, above in found.values())
 
 
-def _derived_sliding(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Return the surfaces on which sliding is to be derived, and the model without saying so."""
-    surfaces = data["surfaces"]
-    asked = tuple(name for name, entry in surfaces.items() if "sliding" in entry)
-    plain = {n: {k: v for k, v in e.items() if k != "sliding"} for n, e in surfaces.items()}
-    return asked, {**data, "surfaces": plain}
-
-
-def _chattering(data: dict[str, Any]) -> tuple[tuple[str, ...], dict[str, Any]]:
-    """Return the walls at which chatter is to be derived, and the model without saying so."""
-    resets = data["resets"]
-    asked = tuple(name for name, entry in resets.items() if entry.get("chatter"))
-    plain = {n: {k: v for k, v in e.items() if k != "chatter"} for n, e in resets.items()}
-    return asked, {**data, "resets": plain}
+def _asked(data: dict[str, Any], kind: str, key: str) -> tuple[tuple[str, ...], dict[str, Any]]:
+    """Return the surfaces or resets whose entries ask for something derived, and the model without that."""
+    entries = data[kind]
+    asked = tuple(name for name, entry in entries.items() if entry.get(key))
+    plain = {n: {k: v for k, v in e.items() if k != key} for n, e in entries.items()}
+    return asked, {**data, kind: plain}
 
 
 def _with_fields(data: Mapping[str, Any]) -> dict[str, Any]:

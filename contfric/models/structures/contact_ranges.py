@@ -20,10 +20,8 @@ from dataclasses import dataclass
 from contfric.errors import ModelError
 from contfric.models.entries import EntryError
 from contfric.models.language.grammar import FLOATS, Scope, names_in, parse
+from contfric.models.language.linear import linear_form
 from contfric.models.structures.contacts import Contact, ContactKind
-
-#: Rounding of a linear expression.
-_SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,8 +92,9 @@ def constraints_of(
     """Yield (inequality, meaning) of what depends on parameters, and on these linearly."""
     for contact, asked, (low, high) in _asked(contacts):
         for left, right in _parts(low, high, params):
-            names = names_in(parse(left)) | names_in(parse(right))
-            if names and names <= set(params) and _is_linear(f"({left}) - ({right})", params):
+            difference = parse(f"({left}) - ({right})")
+            names = names_in(difference)
+            if names and names <= set(params) and linear_form(difference, sorted(names)):
                 yield f"{left} {asked.sign} {right}", f"Contact '{contact.name}': {asked.valid}."
 
 
@@ -139,26 +138,3 @@ def _factors(text: str) -> list[str] | None:
 
 def _is_number(text: str) -> bool:
     return text.replace(".", "", 1).isdigit()
-
-
-def _is_linear(text: str, params: Mapping[str, float]) -> bool:
-    """Tell whether an expression is linear in the parameters, as constraints are."""
-    tree, names = parse(text), sorted(names_in(parse(text)))
-
-    def value(*point: float) -> float:
-        own = dict(zip(names, point, strict=True))
-        return Scope(FLOATS, dict(params) | own).evaluate(tree)
-
-    try:
-        start = value(*[0.0] * len(names))
-        slopes = [
-            value(*(float(i == k) for i in range(len(names)))) - start for k in range(len(names))
-        ]
-        for stretch in (0.5, 2.0, -3.0):
-            point = [stretch * (1.0 + i) for i in range(len(names))]
-            line = start + sum(s * x for s, x in zip(slopes, point, strict=True))
-            if not abs(value(*point) - line) <= _SAME * (1.0 + abs(line)):
-                return False
-    except ModelError:
-        return False
-    return True

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contfric.base.attributes import kept
 from contfric.errors import ContfricError
 from contfric.models.language.python_code import Function, function_of
 from contfric.models.structures.complementarity import ContactsAtRest
@@ -48,7 +49,6 @@ class SharedWays:
     def __init__(self, structure: Structure, description: Description) -> None:
         self._structure, self._loads = structure, structure.loads
         self._names = description.names
-        self._functions: dict[tuple[str, ...], Function | None] = {}
 
     def listed(self, contact: Contact, states: States) -> Iterator[dict[str, str]]:
         """Yield states that may follow where a contact changes its own, the simplest first."""
@@ -139,10 +139,7 @@ class SharedWays:
         ]
 
         def value(*key: str) -> float:
-            if key not in self._functions:
-                text = self._text(*key)
-                self._functions[key] = None if is_zero(text) else function_of(self._names, text)
-            function = self._functions[key]
+            function = self._function(*key)
             return 0.0 if function is None else function(*place)
 
         def free(name: str) -> float:
@@ -155,6 +152,11 @@ class SharedWays:
             np.array([[value("pull", name, letter) for name in own] for letter in "pn"]),
             np.array([value("static", name) for name in own]),
         )
+
+    @kept
+    def _function(self, *key: str) -> Function | None:
+        text = self._text(*key)
+        return None if is_zero(text) else function_of(self._names, text)
 
     def _text(self, what: str, name: str, other: str = "", letter: str = "") -> str:
         """Return a number of the problem as an expression."""
