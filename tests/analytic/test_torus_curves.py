@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 
@@ -100,9 +101,11 @@ def test_strong_resonances_are_named_and_located(coulomb: cf.Curve) -> None:
 
 def test_multipliers_of_an_integrated_model_by_differences(tmp_path: Path) -> None:
     """Where a forced self-excited oscillator is no longer entrained; to R1, where the curve ends."""
-    path = tmp_path / "entrained.yaml"
-    path.write_text(
-        """
+    torus = torus_of(
+        cf.find_orbit(
+            typed(
+                tmp_path,
+                """
 name: entrained
 states: [x, v]
 parameters: {F: 4.0, w: 1.5, mu: 0.25}
@@ -110,9 +113,12 @@ period: 2*pi/w
 field: {x: v, v: mu*(1 - x**2)*v - x - 0.1*x**3 + F*cos(w*t)}
 spread: {x: 3, v: 3}
 """,
-        encoding="utf-8",
+            ),
+            {},
+        ),
+        "F",
+        (0.5, 5.0),
     )
-    torus = torus_of(cf.find_orbit(path, {}), "F", (0.5, 5.0))
     curve = cf.continue_bifurcation(torus, ("w", "F"), {"w": (1.1, 1.8), "F": (0.2, 5.0)})
     assert len(curve) > 10
     for orbit in [*curve[:: len(curve) // 4], *(s.orbit for s in curve.special)]:

@@ -12,6 +12,7 @@ import pytest
 from flint import arb
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 from contfric.certify.equations.chain import Chain, segments_of
@@ -42,9 +43,7 @@ resets:
 
 @cache
 def model(folder: Path) -> cf.Model:
-    path = folder / "friction-and-wall.yaml"
-    path.write_text(MODEL, encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, MODEL)
 
 
 def scene(seed: int, place: float = 0.0) -> dict[str, float]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 from contfric.errors import ModelError
@@ -42,9 +43,7 @@ resets: {threshold: {V: -50}}
 
 
 def written(folder: Path, text: str, spread: str = "") -> cf.Model:
-    path = folder / "model.yaml"
-    path.write_text(text + (f"spread: {spread}\n" if spread else ""), encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, text + (f"spread: {spread}\n" if spread else ""))
 
 
 def pulsed(p: dict[str, float], y: np.ndarray) -> np.ndarray:

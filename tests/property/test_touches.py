@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
+from typed import typed
 
 import contfric as cf
 from contfric.orbit.canonical.section_crossings import every_crossing
@@ -191,9 +192,7 @@ def variant(tmp_path: Path, field: str, more: str = "") -> cf.Model:
         f"surfaces:\n  s: {{observable: v, level: 0}}\n  g: {{observable: x, level: 1}}\n{field}\n"
         f"modes:\n  up: {{in: {{s: +}}}}\n  down: {{in: {{s: -}}{more}}}\nspread: {{x: 1, v: 1}}\n"
     )
-    path = tmp_path / "variant.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
+    return typed(tmp_path, text)
 
 
 def test_what_differs_in_a_derivative_or_at_other_parameters_is_not_one_field(

@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 
 from contfric.certify.equations.chain import Segments
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, numbers
+from contfric.models.balls.numbers import Vector, identity, numbers
 
 #: Most derivatives of an observable that vanish at a start: rest left at the largest load has three.
 MOST_ORDER = 4
@@ -110,7 +110,7 @@ def vanishes_behind(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
     if in_span(numbers(arb_mat([row]) * reset), rows):
         return True
     size = reset.nrows()
-    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    one = identity(size)
     return in_span(row, rows) and in_span(numbers(arb_mat([row]) * (reset - one)), rows)
 
 
