@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_scipy import after
 from scipy.integrate import solve_ivp
 from typed import typed
 
@@ -129,8 +130,7 @@ spread: {x: 3, v: 3}
             return [y[1], damping * y[1] - y[0] - 0.1 * y[0] ** 3 + p["F"] * math.cos(p["w"] * t)]
 
         def period(y: np.ndarray, rate=rate, start=start, end=orbit.period) -> np.ndarray:  # type: ignore[no-untyped-def]
-            span = (start[0], start[0] + end)
-            return solve_ivp(rate, span, y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+            return after(rate, y, (start[0], start[0] + end))
 
         state, h = start[1:], 1e-4
         slopes = [(period(state + h * e) - period(state - h * e)) / (2 * h) for e in np.eye(2)]

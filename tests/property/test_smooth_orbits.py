@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
 from typed import typed
 
 import contfric as cf
@@ -119,8 +119,7 @@ def test_a_smooth_orbit_of_several_modes_doubles() -> None:
         return y[1], -2.0 * p["zeta"] * y[1] - pull + p["e"] * np.cos(omega * t)
 
     def turn(start: np.ndarray) -> np.ndarray:
-        span = (0.0, 2.0 * np.pi / omega)
-        return solve_ivp(field, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return after(field, start, (0.0, 2.0 * np.pi / omega))
 
     start = doubling.orbit.state(0.0)
     assert np.abs(turn(start) - start).max() < 1e-9
@@ -151,8 +150,7 @@ def test_a_model_needs_no_surface_at_all(tmp_path: Path) -> None:
             return y[1], -y[0] - y[0] ** 3 - 0.1 * y[1] + 0.3 * np.cos(w * t)
 
         def turn(start: np.ndarray, w: float = w) -> np.ndarray:
-            span = (0.0, 2.0 * np.pi / w)
-            return solve_ivp(field, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+            return after(field, start, (0.0, 2.0 * np.pi / w))
 
         start = fold.orbit.state(0.0)
         assert np.abs(turn(start) - start).max() < 1e-9

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
 from scipy.optimize import fsolve
 from typed import typed
 
@@ -88,8 +88,7 @@ def motion(start: list[float], until: float, params: dict[str, float]) -> np.nda
     def field(t: float, y: np.ndarray) -> tuple[float, float]:
         return y[1], acceleration(params, t, y)
 
-    run = solve_ivp(field, (0.0, until), start, method="DOP853", rtol=1e-12, atol=1e-13)
-    return run.y[:, -1]
+    return after(field, start, (0.0, until))
 
 
 def test_the_places_of_touches_by_another_integrator() -> None:
