@@ -265,8 +265,8 @@ class Ray:
             assert central.slopes is not None
             assert wide.slopes is not None
             slopes = wide.slopes.resets[reset]
-            leap = self._by_parameter(central.resets[reset], central.slopes.resets[reset], slopes)
-            start, rate, by_state = leap * before, leap * rate, flow * leap
+            mapped = self._by_parameter(central.resets[reset], central.slopes.resets[reset], slopes)
+            start, rate, by_state = mapped * before, mapped * rate, flow * mapped
             late_by = by * start + flow * (self._split(slopes) * before)
         end = flow * start
         speed = field * end
