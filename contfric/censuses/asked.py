@@ -1,4 +1,4 @@
-"""What a search of the census is asked for, and what it leaves behind."""
+"""What a search of the census is asked for, and what it leaves."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class Mesh:
     ----------
     coarse : of the first cells
     torn, near : of the smallest ones that are torn, or near
-    settled : a cell with an orbit in it is halved down to this (sections of dimension above one)
+    decided : a cell with an orbit in it is halved down to this (sections of dimension above one)
     """
 
     coarse: int
     torn: int
     near: int
-    settled: int
+    decided: int
 
     def refined(self, by: int) -> Mesh:
         """Return the mesh with all cells halved a number of times."""
-        return Mesh(self.coarse + by, self.torn + by, self.near + by, self.settled + by)
+        return Mesh(self.coarse + by, self.torn + by, self.near + by, self.decided + by)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +42,21 @@ class Wanted:
 
     def __call__(self, itinerary: ReducedItinerary, periods: int) -> bool:
         """Return whether an itinerary may have an orbit."""
-        walk = canonical_pair(self.model, itinerary), periods
-        return walk in self.fates and self.fates[walk] is None
+        asked = canonical_pair(self.model, itinerary), periods
+        return asked in self.fates and self.fates[asked] is None
 
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """What a search has left behind.
+    """What a search has left.
 
     Attributes
     ----------
     catalogue : the orbits known after it
-    walks : an example of each itinerary from the section back to it or to its mirror image
+    itineraries : an example of each itinerary from the section back to it or to its mirror image
     done : what was done
     """
 
     catalogue: Catalogue
-    walks: tuple[tuple[int, ...], ...]
+    itineraries: tuple[tuple[int, ...], ...]
     done: SectionSearch

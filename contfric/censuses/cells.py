@@ -94,7 +94,7 @@ def halved(grid: Grid, cells: Cells, chosen: NDArray[np.bool_]) -> Cells:
     return make_cells(grid, low.reshape(-1, dimension), size)
 
 
-def common_walks(grid: Grid, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def common_events(grid: Grid, cells: Cells) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the events that all corners have in common, shape (K, E), and which cells are mixed."""
     code, lift = grid.code[cells.rows], grid.lift[cells.rows]
     same = (code == code[:, :1]).all(axis=1)

@@ -33,11 +33,11 @@ from contfric.signature.walks import show
 
 #: Cells of a curve: 4096 a period at first (0.02 s for ten events); where itineraries differ
 #: down to 1.5e-11 of a period, where both sides of a jump are the same to the accuracy of an event.
-_CURVE = Mesh(coarse=12, torn=36, near=36, settled=36)
+_CURVE = Mesh(coarse=12, torn=36, near=36, decided=36)
 #: Cells of other sections, an axis: 64 at first, as the return maps of slides bend over about a tenth of
 #: it; boundaries down to 1/512, beyond which Newton from either side reaches across; near returns
 #: until Newton's disc is larger than the cell by far.
-_BOX = Mesh(coarse=6, torn=9, near=12, settled=9)
+_BOX = Mesh(coarse=6, torn=9, near=12, decided=9)
 #: Bits of the lattices: more than the smallest cells need.
 _BITS = 40
 #: Most halvings beyond these: a box then has 262,144 cells at first, and its events take 100 MB.
@@ -184,7 +184,7 @@ class _Census:
 
     def _record(self, grid: Grid, found: Findings) -> None:
         self.catalogue = found.catalogue
-        for codes in found.walks:
+        for codes in found.itineraries:
             itinerary = grid.itinerary_of(codes)
             half = codes[-1] != grid.own
             self.followed.add(canonical_pair(self.model, whole_of(self.model, itinerary, half)))

@@ -61,7 +61,7 @@ class Grid:
         each event of each node, shapes (K, E), (K, E), (K, E, n)
     time, start : phase in periods and state of each node, shapes (K,), (K, n)
     held, cut : starts that come to rest for ever, and that make more stops than the limit allows
-    walked : an example of each itinerary from the section back to it or to its mirror image, by its hash
+    followed : an example of each itinerary from the section back to it or to its mirror image, by its hash
     """
 
     section: Section
@@ -78,7 +78,7 @@ class Grid:
     count: int = 0
     held: int = 0
     cut: int = 0
-    walked: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    followed: dict[int, tuple[int, ...]] = field(default_factory=dict)
     _index: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -203,7 +203,7 @@ class Grid:
     def _keep(self, phases: FloatArray, done: SectionSweep) -> None:
         code = self._codes(done)
         lift = np.where(code >= 0, done.clocks, np.inf)
-        self._note_walks(code)
+        self._note_itineraries(code)
         self.held += int(
             np.sum(done.outcome[:, 2] == list(SimulationEnd).index(SimulationEnd.HELD))
         )
@@ -241,7 +241,7 @@ class Grid:
         self.cut += int(np.sum((going & ~few & early).any(axis=1) | full[:, -1]))
         return np.where(going & few, code, -1)
 
-    def _note_walks(self, code: IntArray) -> None:
+    def _note_itineraries(self, code: IntArray) -> None:
         """Keep one example of each itinerary from the section back to it, or to its mirror image."""
         if not len(code):
             return
@@ -254,5 +254,5 @@ class Grid:
             row, event = np.nonzero(code == kind)
             found, first = np.unique(hashes[row, event], return_index=True)
             for value, i in zip(found.tolist(), first.tolist(), strict=True):
-                if value not in self.walked:
-                    self.walked[value] = tuple(code[row[i], : event[i] + 1].tolist())
+                if value not in self.followed:
+                    self.followed[value] = tuple(code[row[i], : event[i] + 1].tolist())

@@ -35,22 +35,22 @@ class Catalogue:
 
     def copy(self) -> Catalogue:
         """Return a catalogue of the same orbits that grows by itself."""
-        found = {walk: list(orbits) for walk, orbits in self.orbits.items()}
+        found = {key: list(orbits) for key, orbits in self.orbits.items()}
         return Catalogue(found, set(self.continua))
 
     def add(self, orbit: Orbit) -> None:
         """Add an orbit unless it is known, or repeats a shorter one."""
         if shortest(orbit) is not orbit:
             return
-        walk = canonical_pair(orbit.model, orbit.itinerary), orbit.periods
-        found = self.orbits.setdefault(walk, [])
+        key = canonical_pair(orbit.model, orbit.itinerary), orbit.periods
+        found = self.orbits.setdefault(key, [])
         mirror = orbit.model.symmetry is not None
         if any(stops_distance(orbit.stops, other.stops, mirror) < _SAME for other in found):
             return
         if orbit.degenerate:
-            if walk in self.continua:
+            if key in self.continua:
                 return
-            self.continua.add(walk)
+            self.continua.add(key)
         refined = orbit if orbit.system.half else refine_with_symmetry(orbit)
         found.append(refined if refined.converged and refined.admissible else orbit)
 

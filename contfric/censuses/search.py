@@ -30,7 +30,7 @@ from contfric.censuses.cells import (
     Cells,
     Near,
     closing_nodes,
-    common_walks,
+    common_events,
     halved,
     make_cells,
     near_cells,
@@ -124,7 +124,7 @@ class Search:
             open=self.open,
             complete=self.complete,
         )
-        return Findings(self.catalogue.copy(), tuple(grid.walked.values()), done)
+        return Findings(self.catalogue.copy(), tuple(grid.followed.values()), done)
 
     @property
     def farthest(self) -> float:
@@ -150,7 +150,7 @@ class Search:
 
     def _judge(self, cells: Cells, level: int) -> NDArray[np.bool_]:
         """Return which cells are to be halved; orbits found in them are in the catalogue."""
-        common, mixed = common_walks(self.grid, cells)
+        common, mixed = common_events(self.grid, cells)
         torn, chosen = mixed.copy(), np.zeros(len(cells), dtype=bool)
         limit = np.full(self.grid.section.dimension, _COARSE)
         limit[1:] *= 2.0 * self.grid.reach
@@ -160,7 +160,7 @@ class Search:
             if level >= self.mesh.torn:
                 self.jumps += int(coarse.sum())
             for k in np.flatnonzero(~coarse):
-                if self._is_settled(cells, near, int(k), level):
+                if self._is_decided(cells, near, int(k), level):
                     continue
                 chosen[near.cells[k]] = True
                 if level >= self.mesh.near:
@@ -186,24 +186,24 @@ class Search:
         rows = np.unique(cells.rows[torn])
         limit = np.full(grid.section.dimension, _STRETCH * 0.5**level)
         limit[1:] *= 2.0 * grid.reach
-        for walk in closing_nodes(grid, rows, limit):
-            for row in walk.cells.tolist():
-                place = (row, walk.event, walk.periods, walk.half)
+        for near in closing_nodes(grid, rows, limit):
+            for row in near.cells.tolist():
+                place = (row, near.event, near.periods, near.half)
                 if place not in self._tried:
                     self._tried.add(place)
-                    self._start(row, walk)
+                    self._start(row, near)
 
-    def _start(self, row: int, walk: Near) -> None:
-        codes = tuple(self.grid.code[row, : walk.event + 1].tolist())
+    def _start(self, row: int, near: Near) -> None:
+        codes = tuple(self.grid.code[row, : near.event + 1].tolist())
         itinerary = self.grid.itinerary_of(codes)
-        if not self.wanted(whole_of(self.grid.model, itinerary, walk.half), walk.periods):
+        if not self.wanted(whole_of(self.grid.model, itinerary, near.half), near.periods):
             return
-        root = self._solve(row, walk, itinerary)
-        _keep(self.roots.setdefault((codes, walk.periods, walk.half), []), root)
+        root = self._solve(row, near, itinerary)
+        _keep(self.roots.setdefault((codes, near.periods, near.half), []), root)
 
     # --------------------------------------------------------------------------------- one cell
 
-    def _is_settled(self, cells: Cells, near: Near, k: int, level: int) -> bool:
+    def _is_decided(self, cells: Cells, near: Near, k: int, level: int) -> bool:
         """Tell whether nothing is left to find in a near cell."""
         cell = int(near.cells[k])
         rows = cells.rows[cell]
@@ -212,18 +212,18 @@ class Search:
         if not self.wanted(whole_of(self.grid.model, itinerary, near.half), near.periods):
             return True
         roots = self.roots.setdefault((codes, near.periods, near.half), [])
-        beside = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
-        if not beside:
+        nearby = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
+        if not nearby:
             best = int(rows[np.argmin(np.abs(near.gaps[k]).max(axis=1))])
             _keep(roots, self._solve(best, near, itinerary))
-            beside = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
+            nearby = [root for root in roots if self._distance(cells, cell, root) <= 1.0]
         if np.abs(near.gaps[k]).max() < _FLAT:
             return True
-        if len(beside) != 1:  # several: they are found, and nothing more can be told apart here
-            return bool(beside) and level >= self.mesh.near
-        if beside[0].slope is not None:
-            return self._is_straight(rows, near.gaps[k][:, 0], beside[0])
-        return level >= self.mesh.settled
+        if len(nearby) != 1:  # several: they are found, and nothing more can be told apart here
+            return bool(nearby) and level >= self.mesh.near
+        if nearby[0].slope is not None:
+            return self._is_straight(rows, near.gaps[k][:, 0], nearby[0])
+        return level >= self.mesh.decided
 
     def _distance(self, cells: Cells, cell: int, root: Root) -> float:
         """Return the distance of a root from a cell (0: inside), in sizes of the cell."""

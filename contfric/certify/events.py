@@ -40,7 +40,7 @@ from contfric.events.bifurcation import ACCURACY, Bifurcation, Kind
 from contfric.events.local.touching import rest_at
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, around, column, row_norm, working
+from contfric.models.balls.numbers import Vector, around, column, identity, row_norm, working
 from contfric.orbit.orbit import Orbit
 
 #: Bits tried one after the other: 160 leave 30 digits where the condition is 1e10.
@@ -312,11 +312,8 @@ def _simple(
     _, rows = chain.linearised(z)
     jacobian = arb_mat([row[: chain.size] for row in rows])
     inverse = approximate_inverse(jacobian)
-    if inverse is not None:
-        size = chain.size
-        identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
-        if row_norm(identity - inverse * jacobian) < 1:
-            return Finding(Verdict.PROVED)
+    if inverse is not None and row_norm(identity(chain.size) - inverse * jacobian) < 1:
+        return Finding(Verdict.PROVED)
     return Finding(Verdict.UNDECIDED, "the orbit may have a multiplier 1 at the event")
 
 

@@ -83,7 +83,7 @@ class Memory(NamedTuple):
 
 
 class CycleWorkspace(NamedTuple):
-    """Workspace for a cycle: its own walk, its joint z, frames, and the algebra of a matrix."""
+    """Workspace for a cycle: the solution along it, its joint z, frames, and the algebra of a matrix."""
 
     transit: Transit
     z: FloatArray
@@ -195,12 +195,12 @@ def doubt(memory):  # type: ignore[no-untyped-def]
 
 @helper
 def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, workspace):  # type: ignore[no-untyped-def]
-    """Walk ``joints`` segments from the joint ``cycle.z`` with the tangent map.
+    """Follow ``joints`` segments from the joint ``cycle.z`` with the tangent map.
 
     Returns
     -------
     tuple
-        (mode and surface at the end as one number, -1 if the walk broke off; rank; periods; phase;
+        (mode and surface at the end as one number, -1 if the solution broke off; rank; periods; phase;
         duration).
         ``cycle.images`` holds the images of the unit vectors, row by row; ``cycle.logs`` the growth
         of the frame.

@@ -91,6 +91,10 @@ class Problem:
         """Tell whether a point is at a physical limit (S0 = S), where conditions degenerate together."""
         return bool(self.within_limits(w[None, :])[0] < _AT_LIMIT * np.min(self.box.widths))
 
+    def joints_of(self, orbit: Orbit) -> FloatArray:
+        """Return the joints of an event's orbit in this problem, which may be that of its half."""
+        return orbit.joints if orbit.system is self.system else orbit.as_half().joints
+
     def orbit(self, joints: FloatArray, w: FloatArray) -> Orbit:
         """Return a point as an orbit."""
         return Orbit(self.system, joints.copy(), with_entries(self.vector, self.which, w), 0.0)
@@ -118,11 +122,6 @@ def check_start(bifurcation: Bifurcation, box: PlaneRanges) -> None:
     ParameterError
         For what is no located bifurcation inside the plane, or lies on a bridge.
     """
-    if not isinstance(bifurcation, Bifurcation):
-        raise ParameterError(
-            f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
-            "branch.bifurcations or diagram.bifurcations"
-        )
     if not bifurcation.located:
         raise ParameterError(f"{bifurcation!r} is not located: its curve has no start")
     kind, orbit = bifurcation.kind, bifurcation.orbit

@@ -101,11 +101,8 @@ def continue_bifurcation(
             f"a curve starts from a Bifurcation, got {type(bifurcation).__name__}: take one of "
             "branch.bifurcations or diagram.bifurcations"
         )
-    model = bifurcation.orbit.model
-    box = box_of(model, parameters, ranges)
-    largest = largest_step(max_step, model)
-    whole_number("max_points", max_points, least=2)
-    function_of("progress", progress)
+    box = box_of(bifurcation.orbit.model, parameters, ranges)
+    largest = checked_options(bifurcation.orbit.model, max_step, max_points, progress)
     if bifurcation.kind is Kind.NS:
         from contfric.curves.of_quantities.torus import continue_torus
 
@@ -122,6 +119,13 @@ def continue_bifurcation(
         problem, start.reversed(), border, largest, max_points, progress, keep=True
     )
     return join_sides(behind, ahead)
+
+
+def checked_options(model: Model, max_step: Any, max_points: Any, progress: Any) -> float:
+    """Check what a user gives to any curve; return the largest step."""
+    whole_number("max_points", max_points, least=2)
+    function_of("progress", progress)
+    return largest_step(max_step, model)
 
 
 def largest_step(max_step: Any, model: Model) -> float:
@@ -142,7 +146,8 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
     ConvergenceError
         If Newton fails there, ends somewhere else, or no orbit near it is admissible.
     """
-    orbit = problem.orbit(_joints(problem, bifurcation), bifurcation.orbit.vector[problem.which])
+    near = bifurcation.orbit
+    orbit = problem.orbit(problem.joints_of(near), near.vector[problem.which])
     found = first_curve_point(problem, orbit)
     if found is None:
         raise ConvergenceError(f"{bifurcation!r} has no curve with a unique direction", orbit)
@@ -164,11 +169,6 @@ def start_of_curve(problem: Problem, bifurcation: Bifurcation, largest: float) -
     raise ConvergenceError(
         f"the orbits on the curve near {bifurcation!r} {text or 'are not admissible'}", orbit
     )
-
-
-def _joints(problem: Problem, bifurcation: Bifurcation) -> FloatArray:
-    orbit = bifurcation.orbit
-    return orbit.joints if orbit.system is problem.system else orbit.as_half().joints
 
 
 def trace_curve_side(

@@ -10,8 +10,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
 from contfric.plot.appearance.cells import draw_cells
-from contfric.plot.appearance.names import fixed_text, parameter_label, told
-from contfric.plot.appearance.save import axes_or_new, name_axes
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes, title_axes
 from contfric.plot.appearance.style import GREY, SMALL, TEXT, lighter, sized
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def plot_lyapunov_map(lmap: LyapunovMap, ax: Axes | None = None) -> Axes:
         )
         bar.ax.tick_params(labelsize=sized(SMALL + 1))
     name_axes(ax, *map(parameter_label, lmap.axes))
-    ax.set_title(fixed_text(told(lmap.params, lmap.model.defaults)), fontsize=sized(TEXT))
+    title_axes(ax, lmap.model, lmap.params)
     return ax
 
 

@@ -10,9 +10,9 @@ from matplotlib.lines import Line2D
 
 from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError
-from contfric.plot.appearance.names import fixed_text, parameter_label, told
-from contfric.plot.appearance.save import axes_or_new, name_axes
-from contfric.plot.appearance.style import GREY, SMALL, TEXT, lighter, sized
+from contfric.plot.appearance.names import parameter_label
+from contfric.plot.appearance.save import axes_or_new, name_axes, title_axes
+from contfric.plot.appearance.style import GREY, SMALL, lighter, sized
 
 if TYPE_CHECKING:
     from contfric.quantities.registry import QuantityLike
@@ -51,16 +51,15 @@ def plot_sweep(sweep: Sweep, ax: Axes | None = None, state: str | None = None) -
     size = max(_POINT, min(_LARGE, _DENSE / len(sweep.values)))
     for k, direction in enumerate(sweep.runs):
         x, y = sweep.points(direction, state)
-        rest = (
-            len(sweep.runs) - 1 - k
-        )  # points of the first one are larger: seen below those of the second
-        _draw(ax, x, y, _COLOURS[direction], 2.0, direction, size * _LARGER**rest)
+        # points of the first one are larger: seen below those of the second
+        larger = _LARGER ** (len(sweep.runs) - 1 - k)
+        _draw(ax, x, y, _COLOURS[direction], 2.0, direction, size * larger)
     name_axes(
         ax,
         parameter_label(sweep.parameter),
         f"{parameter_label(name)} at {_section(sweep.section)}",
     )
-    ax.set_title(fixed_text(told(sweep.params, sweep.model.defaults)), fontsize=sized(TEXT))
+    title_axes(ax, sweep.model, sweep.params)
     if len(sweep.runs) > 1:
         ax.legend(fontsize=sized(SMALL), markerscale=4.0 * _POINT / size, loc="best")
     return ax

@@ -18,7 +18,7 @@ from contfric.errors import ContfricError, ParameterError, shown
 from contfric.models.language.grammar import Scope
 from contfric.models.language.quantity_texts import Parsed, read
 from contfric.quantities.duals import Dual, Kinks, constant, divide
-from contfric.quantities.extreme import integrated, moved_peak, peak_of
+from contfric.quantities.extreme import integrated
 from contfric.quantities.functionals import Asked, Measuring, Totals
 from contfric.quantities.inside import inside_of
 from contfric.quantities.motion import Directions, OrbitMotion
@@ -115,8 +115,7 @@ def differentiated(
         with np.errstate(all="ignore"):
             value, slopes = measuring.smooth(functional)
         return NumberWithGradient(value, slopes, slopes, tuple(measuring.kinks))
-    found = None if directions is None else _extreme(quantity, orbit, directions)
-    return found or _measured(quantity.parsed, orbit, directions, known or {})
+    return _measured(quantity.parsed, orbit, directions, known or {})
 
 
 def _of_function(
@@ -136,13 +135,6 @@ def _of_function(
     slopes, unsure = _differences(measure, orbit, directions)
     kinks = (f"the function {quantity.name} may have a kink here",) if unsure else ()
     return NumberWithGradient(value, slopes, slopes, kinks)
-
-
-def _extreme(quantity: Quantity, orbit: Orbit, directions: Directions) -> NumberWithGradient | None:
-    """Return the extremum of an observable by compiled code; None if it is no such, or is reached twice."""
-    peak = peak_of(quantity)
-    found = None if peak is None else moved_peak(peak, orbit, directions)
-    return None if found is None else NumberWithGradient(found[0], found[1], found[1])
 
 
 def _measured(

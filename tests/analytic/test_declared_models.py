@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 
@@ -33,9 +34,7 @@ def test_bang_bang() -> None:
 
 
 def test_impacts(tmp_path: Path) -> None:
-    path = tmp_path / "walled.yaml"
-    path.write_text(WALL, encoding="utf-8")
-    orbit = cf.find_orbit(path, {"e": 0.8, "zeta": 0.05, "Omega": 0.7})
+    orbit = cf.find_orbit(typed(tmp_path, WALL), {"e": 0.8, "zeta": 0.05, "Omega": 0.7})
     impacts = str(orbit.signature).count("impact@wall")
     assert impacts > 0
     shrinks = 0.8 ** (2 * impacts) * math.exp(-2 * 0.05 * orbit.periods * 2 * math.pi / 0.7)

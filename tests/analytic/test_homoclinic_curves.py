@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -89,9 +90,9 @@ spread: {x: 1, v: 1}
 
 def test_a_loop_of_a_smooth_model_has_no_boundary_equilibrium(tmp_path: Path) -> None:
     """Its joints lie on the section on which the rate of x vanishes, as the saddle does."""
-    path = tmp_path / "smooth_loop.yaml"
-    path.write_text(SMOOTH, encoding="utf-8")
-    branch = cf.continue_orbit(cf.find_orbit(path, {}, state=[0.6, 0.0]), "mu", (-0.99, -0.5))
+    branch = cf.continue_orbit(
+        cf.find_orbit(typed(tmp_path, SMOOTH), {}, state=[0.6, 0.0]), "mu", (-0.99, -0.5)
+    )
     end = branch.ends[1]
     assert end.reason is cf.EndReason.PERIOD and "boundary" not in str(end)
     assert branch.values[-1] == pytest.approx(
@@ -107,8 +108,6 @@ def test_period_grows_by_the_eigenvalue_that_is_nearer_to_zero(seed: int, tmp_pa
     """
     draw = np.random.default_rng(seed)
     e, k = float(draw.uniform(0.5, 0.65)), float(draw.uniform(0.05, 0.12))
-    path = tmp_path / "kicked.yaml"
-    path.write_text(KICKED.format(e=e, k=k), encoding="utf-8")
 
     def apart(c: float, e: float) -> float:
         unstable, stable = eigenvalues(c)
@@ -116,7 +115,9 @@ def test_period_grows_by_the_eigenvalue_that_is_nearer_to_zero(seed: int, tmp_pa
 
     end = float(brentq(apart, -1.0, 1.5, args=(e,), xtol=1e-15))
     assert end > 0.05
-    orbit = cf.find_orbit(path, {"c": end + 0.03}, state=[0.98, 0.0], longest=2000)
+    orbit = cf.find_orbit(
+        typed(tmp_path, KICKED.format(e=e, k=k)), {"c": end + 0.03}, state=[0.98, 0.0], longest=2000
+    )
     ranges = {"c": (end - 1.0, end + 1.0), "e": (0.8 * e, 1.2 * e)}
     found = cf.continue_orbit(orbit, "c", ranges["c"])
     assert cf.EndReason.PERIOD in {side.reason for side in found.ends}

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 from scipy.optimize import brentq, minimize_scalar
+from typed import typed
 
 import contfric as cf
 
@@ -456,9 +457,7 @@ field: {x: v, v: cos(W*t) - x - 2*zeta*v}
 
 @pytest.fixture(scope="module")
 def smooth(tmp_path_factory: pytest.TempPathFactory) -> cf.Model:
-    path = tmp_path_factory.mktemp("models") / "smooth.yaml"
-    path.write_text(SMOOTH, encoding="utf-8")
-    return cf.load_model(path)
+    return typed(tmp_path_factory.mktemp("models"), SMOOTH)
 
 
 def test_the_resonance_peak_of_a_linear_oscillator_is_a_formula(smooth: cf.Model) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 
@@ -31,9 +32,7 @@ REST = [0.0, 0.0]
 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory) -> cf.Model:
-    path = tmp_path_factory.mktemp("block") / "block.yaml"
-    path.write_text(BLOCK)
-    return cf.load_model(path)
+    return typed(tmp_path_factory.mktemp("block"), BLOCK)
 
 
 def flight(side, start, speed, a, W):
@@ -130,9 +129,9 @@ def test_the_block_does_not_come_to_rest_where_it_is_thrown_before(block) -> Non
 
 
 def test_a_block_that_comes_to_rest_is_found_without_being_told(tmp_path) -> None:
-    path = tmp_path / "plain.yaml"
-    path.write_text(BLOCK.replace(", chatter: true", ""))
-    orbit = cf.find_orbit(path, {"a": 1.05}, state=[1e-4, 0.0])
+    orbit = cf.find_orbit(
+        typed(tmp_path, BLOCK.replace(", chatter: true", "")), {"a": 1.05}, state=[1e-4, 0.0]
+    )
     assert [mode for mode, _ in orbit.as_whole().itinerary].count("chatter") == 2
 
 

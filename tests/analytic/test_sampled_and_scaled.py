@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import met
 from scipy.linalg import expm
 from typed import typed
 
@@ -196,16 +196,8 @@ def test_a_loop_that_slips_its_phase_against_scipy(tmp_path: Path) -> None:
         def ahead(_t, y):
             return y[0] - math.pi
 
-        ahead.terminal, ahead.direction = True, 1.0
-        found = solve_ivp(
-            lambda _t, y: (1.2 - y[1], (sign - y[1]) / 2.0),
-            (0.0, 50.0),
-            (0.0, z),
-            events=ahead,
-            rtol=1e-12,
-            atol=1e-13,
-        )
-        return float(found.t_events[0][0]), float(found.y_events[0][0][1])
+        time, end = met(lambda _t, y: (1.2 - y[1], (sign - y[1]) / 2.0), (0.0, z), ahead, 1.0)
+        return time, float(end[1])
 
     z, period = 0.0, 0.0
     for _ in range(60):

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from by_scipy import misses
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import contfric as cf
 
 
-def follow(orbit: cf.Orbit, acceleration: object, count: int) -> int:
+def follow(orbit: cf.Orbit, acceleration: Any, count: int) -> int:
     """Integrate each segment of an orbit; return how many were compared."""
-    checked = 0
-    for i, (mode, _) in enumerate(orbit.itinerary):
-        (t0, *start), (t1, *end) = orbit.begins[i], orbit.ends[i]
 
-        def rates(t: float, y: np.ndarray, mode: str = mode) -> np.ndarray:
-            return np.concatenate([y[count:], acceleration(mode, t, y)])  # type: ignore[operator]
+    def field_of(mode: str) -> Any:
+        return lambda t, y: np.concatenate([y[count:], acceleration(mode, t, y)])
 
-        found = solve_ivp(rates, (t0, t1), start, rtol=1e-11, atol=1e-12)
-        assert np.max(np.abs(found.y[:, -1] - end)) < 1e-8
-        checked += 1
-    return checked
+    assert misses(orbit, field_of) < 1e-8
+    return len(orbit.itinerary)
 
 
 def held(mode: str, places: tuple[int, ...], forces: np.ndarray, kinetic: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import met
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from typed import typed
@@ -190,13 +190,10 @@ def test_froude_pendulum_against_scipy(froude: cf.Diagram) -> None:
     def back(_t, y):
         return y[1] - Om
 
-    back.terminal, back.direction = True, 1
     released = math.asin(mu0 - c * Om)
     start = [released + 1e-10, Om - 1e-15]
-    run = solve_ivp(
-        slow, (0, 20), start, method="DOP853", events=back, rtol=1e-12, atol=1e-14, first_step=1e-3
-    )
-    assert run.y[0, -1] == pytest.approx(math.pi, abs=1e-5)
+    _, end = met(slow, start, back, 1, (0, 20), atol=1e-14, first_step=1e-3)
+    assert end[0] == pytest.approx(math.pi, abs=1e-5)
 
 
 GENES = """
@@ -331,10 +328,8 @@ def adex_flight(current: float, w: float):
     def spike(_, y):
         return y[0]
 
-    spike.terminal = True
-    start = [-70.6, w, 0.0]
-    run = solve_ivp(field, (0.0, 1e4), start, "DOP853", events=spike, rtol=1e-12, atol=1e-11)
-    return run.y[2, -1], run.y[1, -1]
+    _, (_, last, t) = met(field, [-70.6, w, 0.0], spike, span=(0.0, 1e4), atol=1e-11)
+    return t, last
 
 
 @pytest.mark.parametrize("current", [700.0, 1000.0, 2500.0])

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_scipy import after
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 
@@ -100,9 +102,11 @@ def test_strong_resonances_are_named_and_located(coulomb: cf.Curve) -> None:
 
 def test_multipliers_of_an_integrated_model_by_differences(tmp_path: Path) -> None:
     """Where a forced self-excited oscillator is no longer entrained; to R1, where the curve ends."""
-    path = tmp_path / "entrained.yaml"
-    path.write_text(
-        """
+    torus = torus_of(
+        cf.find_orbit(
+            typed(
+                tmp_path,
+                """
 name: entrained
 states: [x, v]
 parameters: {F: 4.0, w: 1.5, mu: 0.25}
@@ -110,9 +114,12 @@ period: 2*pi/w
 field: {x: v, v: mu*(1 - x**2)*v - x - 0.1*x**3 + F*cos(w*t)}
 spread: {x: 3, v: 3}
 """,
-        encoding="utf-8",
+            ),
+            {},
+        ),
+        "F",
+        (0.5, 5.0),
     )
-    torus = torus_of(cf.find_orbit(path, {}), "F", (0.5, 5.0))
     curve = cf.continue_bifurcation(torus, ("w", "F"), {"w": (1.1, 1.8), "F": (0.2, 5.0)})
     assert len(curve) > 10
     for orbit in [*curve[:: len(curve) // 4], *(s.orbit for s in curve.special)]:
@@ -123,8 +130,7 @@ spread: {x: 3, v: 3}
             return [y[1], damping * y[1] - y[0] - 0.1 * y[0] ** 3 + p["F"] * math.cos(p["w"] * t)]
 
         def period(y: np.ndarray, rate=rate, start=start, end=orbit.period) -> np.ndarray:  # type: ignore[no-untyped-def]
-            span = (start[0], start[0] + end)
-            return solve_ivp(rate, span, y, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+            return after(rate, y, (start[0], start[0] + end))
 
         state, h = start[1:], 1e-4
         slopes = [(period(state + h * e) - period(state - h * e)) / (2 * h) for e in np.eye(2)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after, met
 from scipy.linalg import expm
 from scipy.optimize import fsolve
 
@@ -110,11 +110,9 @@ def beat(start: np.ndarray, p: dict[str, float]) -> np.ndarray:
     def gate(t: float, y: np.ndarray, opens: bool) -> float:
         return float(y[0] - p["vgate"])
 
-    gate.terminal, gate.direction = True, -1.0  # type: ignore[attr-defined]
-    tight = {"rtol": 1e-12, "atol": 1e-14, "method": "DOP853"}
-    fired = solve_ivp(rate, (0.0, p["BCL"]), start, events=gate, args=(False,), **tight)
-    rest = solve_ivp(rate, (fired.t[-1], p["BCL"]), fired.y[:, -1], args=(True,), **tight)
-    return np.asarray(rest.y[:, -1] + [p["stim"], 0.0])
+    t, fired = met(rate, start, gate, -1.0, (0.0, p["BCL"]), atol=1e-14, args=(False,))
+    rest = after(rate, fired, (t, p["BCL"]), atol=1e-14, args=(True,))
+    return np.add(rest, [p["stim"], 0.0])
 
 
 def test_beats_of_a_heart_alternate(tmp_path: Path) -> None:
@@ -197,15 +195,12 @@ def test_a_controller_with_an_integral_hunts(tmp_path: Path, Ki: float) -> None:
     def stop(t: float, y: np.ndarray) -> float:
         return float(y[2]) if t > 0.05 else float(sense)
 
-    stop.terminal = True  # type: ignore[attr-defined]
-    tight = {"rtol": 1e-12, "atol": 1e-14, "method": "DOP853"}
-    run = solve_ivp(slip, (0.0, 100.0), released[1:], events=stop, max_step=0.2, **tight)
-    integral, x, _ = run.y[:, -1]
+    t, (integral, x, _) = met(slip, released[1:], stop, max_step=0.2, atol=1e-14)
     # at rest the integral grows by x until the load is at the other limit
     rest = (sense * p["Fs"] - p["Kp"] * x) / (Ki * x) - integral / x
     assert rest > 0.0
     assert [integral + x * rest, x] == pytest.approx((-released[1:3]).tolist(), abs=1e-9)
-    assert orbit.period == pytest.approx(2.0 * (run.t[-1] + rest), abs=1e-8)
+    assert orbit.period == pytest.approx(2.0 * (t + rest), abs=1e-8)
 
 
 @pytest.mark.parametrize(
@@ -265,8 +260,7 @@ def test_a_rotor_rubs(tmp_path: Path) -> None:
         ]
 
     t, *y = orbit.begins[0]
-    run = solve_ivp(field, (t, t + orbit.period), y, rtol=1e-11, atol=1e-12, method="DOP853")
-    assert run.y[:, -1] == pytest.approx(y, abs=1e-8)
+    assert after(field, y, (t, t + orbit.period)) == pytest.approx(y, abs=1e-8)
 
 
 def test_impacts_that_lose_ever_less_are_told(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from by_scipy import met
 from scipy.integrate import solve_ivp
 from typed import typed
 
@@ -173,13 +174,6 @@ def test_a_kink_of_a_reset_is_said(tmp_path) -> None:
     assert "has a kink" not in str(cf.check_model(typed(tmp_path, along)))
 
 
-def until(field: Callable, y, event: Callable, direction: float):
-    """Return (time, state) where an event is met in one direction."""
-    event.terminal, event.direction = True, direction
-    found = solve_ivp(field, (0, 200), y, method="DOP853", rtol=1e-12, atol=1e-13, events=event)
-    return found.t[-1], found.y[:, -1]
-
-
 def test_a_spiking_neuron(tmp_path) -> None:
     """Izhikevich (2003), regular spiking at I = 10: the time between two spikes, in ms."""
     orbit = cf.find_orbit(typed(tmp_path, IZHIKEVICH), state=[-65, -13])
@@ -187,7 +181,7 @@ def test_a_spiking_neuron(tmp_path) -> None:
     def field(t, y):
         return 0.04 * y[0] ** 2 + 5 * y[0] + 140 - y[1] + 10, 0.02 * (0.2 * y[0] - y[1])
 
-    time, peak = until(field, orbit.begins[0, 1:], lambda t, y: y[0] - 30, 1)
+    time, peak = met(field, orbit.begins[0, 1:], lambda t, y: y[0] - 30, 1)
     assert time == pytest.approx(orbit.period, abs=1e-7)
     assert peak[1] + 8 == pytest.approx(orbit.begins[0, 2], abs=1e-7)
 
@@ -205,9 +199,9 @@ def test_a_woodpecker_passes_where_it_is_not_kicked(tmp_path) -> None:
 
     strike = [exit_ for _, exit_ in orbit.itinerary].index("beak")
     w = orbit.ends[strike, 2]
-    down, y = until(swings, [0.4, -0.7 * w], lambda t, y: y[0] + 0.15, -1)
-    below, y = until(falls, y, lambda t, y: y[0] + 0.15, 1)
-    up, y = until(swings, [y[0], 0.55 * y[1] + 0.35], lambda t, y: y[0] - 0.4, 1)
+    down, y = met(swings, [0.4, -0.7 * w], lambda t, y: y[0] + 0.15, -1)
+    below, y = met(falls, y, lambda t, y: y[0] + 0.15, 1)
+    up, y = met(swings, [y[0], 0.55 * y[1] + 0.35], lambda t, y: y[0] - 0.4, 1)
     assert y[1] == pytest.approx(w, abs=1e-9)
     assert down + below + up == pytest.approx(orbit.period, abs=1e-9)
 
@@ -306,9 +300,9 @@ def test_a_swing_that_comes_to_stand_on_its_head(tmp_path) -> None:
             lambda t, y, length=length: [y[1], -np.sin(y[0]) / length - 0.1 * y[1]]
             for length in (1.0 + d, 1.0 - d)
         )
-        _, low = until(down, [th, 0.0], lambda t, y: y[0], -1)
+        _, low = met(down, [th, 0.0], lambda t, y: y[0], -1)
         kicked = [0.0, low[1] * ((1.0 + d) / (1.0 - d)) ** 2]
-        return -float(until(up, kicked, lambda t, y: y[1], 1)[1][0])
+        return -float(met(up, kicked, lambda t, y: y[1], 1)[1][0])
 
     assert swung(0.066, orbit.x_max) == pytest.approx(orbit.x_max, rel=1e-9)
     diagram = cf.explore(orbit, "d", (0.065, 0.07))

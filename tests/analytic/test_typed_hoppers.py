@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import met
 from typed import typed
 
 import contfric as cf
@@ -34,19 +34,12 @@ resets:
 def lands(speed: float, push: float, k: float) -> tuple[float, float]:
     """Return the speed at the next landing, and the time to it: four flights by scipy."""
 
-    def until(field, start, surface, direction):
-        surface.terminal, surface.direction = True, direction
-        found = solve_ivp(
-            field, (0, 50), start, method="DOP853", events=surface, rtol=1e-12, atol=1e-13
-        )
-        return found.y[:, -1], found.t[-1]
-
     def leg(_, z):
         return [z[1], -1.0 - k * z[0] - z[1]]
 
-    low, first = until(leg, [0.0, -speed], lambda _, z: z[1], 1)
+    first, low = met(leg, [0.0, -speed], lambda _, z: z[1], 1)
     pushed = [low[0] + 0.5 * (push - 1.0) * 0.01, 0.1 * (push - 1.0)]
-    up, last = until(leg, pushed, lambda _, z: z[0], 1)
+    last, up = met(leg, pushed, lambda _, z: z[0], 1)
     return float(up[1]), first + 0.1 + last + 2.0 * float(up[1])
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import met
 from typed import typed
 
 import contfric as cf
@@ -68,12 +68,11 @@ def test_a_string_sticks_to_its_bow(tmp_path: Path) -> None:
     def limit(t: float, y: np.ndarray) -> float:
         return abs(force(y)) - 0.8
 
-    limit.terminal = True
-    exact = solve_ivp(rates, (0, 20), start, "DOP853", events=limit, rtol=1e-13, atol=1e-14)
+    last, end = met(rates, start, limit, span=(0, 20), rtol=1e-13, atol=1e-14)
     found = cf.simulate(model, state=start, periods=20.0)
     assert found.itinerary[0][0] == "slide"
-    assert found.times[0] == pytest.approx(exact.t[-1], abs=1e-10)
-    assert found.states[0] == pytest.approx(exact.y[:, -1], abs=1e-10)
+    assert found.times[0] == pytest.approx(last, abs=1e-10)
+    assert found.states[0] == pytest.approx(end, abs=1e-10)
 
 
 def test_a_limit_that_another_surface_divides(tmp_path: Path) -> None:
@@ -90,11 +89,10 @@ def test_a_limit_that_another_surface_divides(tmp_path: Path) -> None:
     def limit(t: float, y: np.ndarray) -> float:
         return float(2.0 * (2.5 * np.cos(0.6 * t) - y[0]) + 1.5 * y[2] - 1.0)
 
-    limit.terminal = True
-    exact = solve_ivp(rates, (t, t + 1), [x, v, z], "DOP853", events=limit, rtol=1e-13, atol=1e-14)
+    _, end = met(rates, [x, v, z], limit, span=(t, t + 1), rtol=1e-13, atol=1e-14)
     found = cf.simulate(model, state=[x, v, z], time=t, periods=1.0)
     assert [mode for mode, _ in found.itinerary[:2]] == ["top_free", "linear"]
-    assert found.states[0] == pytest.approx(exact.y[:, -1], abs=1e-11)
+    assert found.states[0] == pytest.approx(end, abs=1e-11)
     caught = typed(tmp_path, LIMITED.replace(", sliding: filippov", ""))
     with pytest.raises(cf.ConvergenceError, match="has left the region of 'bottom_free' at 'hi'"):
         cf.find_orbit(caught)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after, met
 from scipy.linalg import expm
 from scipy.optimize import fsolve
 from typed import typed
@@ -170,11 +170,9 @@ def test_thyristors_that_two_resets_fire(tmp_path, fire: float) -> None:
     def out(t, y):
         return y[2]
 
-    out.terminal, out.direction = True, -1
-    tight = {"rtol": 1e-11, "atol": 1e-12, "method": "DOP853"}
-    on = solve_ivp(conducts, (fire, fire + math.pi), [*start[1:3], 0.0], events=out, **tight)
-    off = solve_ivp(blocks, (on.t[-1], fire + math.pi), [*on.y[:2, -1], 0.0], **tight)
-    assert off.y[:2, -1] == pytest.approx(-start[1:3], abs=1e-9)
+    t, on = met(conducts, [*start[1:3], 0.0], out, -1, (fire, fire + math.pi))
+    off = after(blocks, [*on[:2], 0.0], (t, fire + math.pi))
+    assert off[:2] == pytest.approx(-start[1:3], abs=1e-9)
 
 
 #: Two relays in turn, with a lag: no rate of x or v jumps, and nothing slides where the two surfaces cross.
@@ -355,15 +353,11 @@ def test_a_motor_whose_modes_overlap_and_turn(tmp_path, V: float) -> None:
             L, dL = 0.05 + 0.03 * np.cos(50 * t), -0.03 * np.sin(50 * t)
             return [(volts - y[0] - 50 * dL * y[0]) / L]
 
-        def met(_, y):
+        def hit(_, y):
             return y[0] - level
 
-        met.terminal = True
-        start = [i + (1e-9 if level == i else 0.0)]
-        found = solve_ivp(
-            rate, (t, angle / 50), start, "DOP853", events=met, rtol=1e-12, atol=1e-13
-        )
-        return found.t[-1], found.y[0, -1]
+        t, (i,) = met(rate, [i + (1e-9 if level == i else 0.0)], hit, span=(t, angle / 50))
+        return t, i
 
     t, i, volts, events = -0.6 / 50, 0.0, V, []
     while t < 0.3 / 50:  # in the band

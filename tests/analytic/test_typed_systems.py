@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after, met
 from scipy.optimize import brentq
 from typed import typed
 
@@ -104,10 +104,8 @@ def test_modes_may_be_called_plus_and_minus(tmp_path) -> None:
         return y[1], -0.4 * y[1] + dead - y[0], e
 
     t, *state = orbit.ends[0]
-    half = solve_ivp(
-        field, (t, t + math.pi / 0.7), state, method="DOP853", rtol=1e-11, atol=1e-13, max_step=0.02
-    )
-    assert half.y[:, -1] == pytest.approx(-np.array(state), abs=1e-8)
+    half = after(field, state, (t, t + math.pi / 0.7), max_step=0.02)
+    assert half == pytest.approx(-np.array(state), abs=1e-8)
 
 
 def test_a_spike_that_is_just_touched_jumps(tmp_path) -> None:
@@ -189,9 +187,8 @@ def test_a_runner_on_a_spring(tmp_path) -> None:
         def lift(_, y):
             return math.hypot(y[0], y[1]) - 1.0
 
-        lift.terminal, lift.direction = True, 1
-        run = solve_ivp(stance, (0, 5), start, method="DOP853", events=lift, rtol=1e-12, atol=1e-13)
-        return float(run.y[1, -1] + run.y[3, -1] ** 2 / 2.0)
+        _, y = met(stance, start, lift, 1, (0, 5))
+        return float(y[1] + y[3] ** 2 / 2.0)
 
     places = dict(zip((exit_ for _, exit_ in orbit.itinerary), orbit.ends, strict=True))
     _, _, height, speed, _ = places["apex"]

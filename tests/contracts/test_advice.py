@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import sympy
+from typed import typed
 
 import contfric as cf
 from contfric.models.language.formulas import FORMULAS, formula, kinks_in
@@ -93,9 +94,7 @@ resets:
   fire2: {x2: 0, x1: "min(1, x1 + eps)"}
 spread: {x1: [0, 1], x2: [0, 1]}
 """
-    path = tmp_path / "model.yaml"
-    path.write_text(text)
-    model = cf.load_model(path)
+    model = typed(tmp_path, text)
     report = str(cf.check_model(model))
     assert "is in no domain" not in report
     assert "the reset at 'fire1' has a kink" in report

@@ -15,11 +15,6 @@ from contfric.orbit.index import opening_sign, opening_signs
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
 
-@pytest.fixture(scope="module")
-def branch() -> cf.Branch:
-    return cf.continue_orbit(cf.find_orbit("coulomb", PARAMS), "Omega", (0.4, 0.6))
-
-
 def test_altered_classes_are_those_of_replace(branch) -> None:
     orbit, event, end = branch[3], branch.bifurcations[0], branch.ends[0]
     for one, changes in (

@@ -15,11 +15,6 @@ START = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
 
 @pytest.fixture(scope="module")
-def branch():
-    return cf.continue_orbit(cf.find_orbit("coulomb", START), "Omega", (0.4, 0.6))
-
-
-@pytest.fixture(scope="module")
 def fold(branch):
     return next(b for b in branch.bifurcations if b.kind is cf.Kind.SN)
 

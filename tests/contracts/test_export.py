@@ -17,16 +17,6 @@ import contfric as cf
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
 
-@pytest.fixture(scope="module")
-def orbit() -> cf.Orbit:
-    return cf.find_orbit("coulomb", PARAMS)
-
-
-@pytest.fixture(scope="module")
-def diagram(orbit: cf.Orbit) -> cf.Diagram:
-    return cf.explore(orbit, "Omega", (0.48, 0.55))
-
-
 def read_csv(path: Path) -> tuple[dict[str, list[str]], dict[str, str]]:
     with path.open(encoding="utf-8", newline="") as file:
         names, units, *rows = list(csv.reader(file))

@@ -67,21 +67,6 @@ from contfric.plot.orbits.pieces import pieces_of
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
 
-@pytest.fixture(scope="module")
-def orbit() -> Any:
-    return cf.find_orbit("coulomb", FIG5)
-
-
-@pytest.fixture(scope="module")
-def branch(orbit: Any) -> Any:
-    return cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
-
-
-@pytest.fixture(scope="module")
-def diagram(orbit: Any) -> Any:
-    return cf.explore(orbit, "Omega", (0.4, 0.6))
-
-
 @pytest.fixture(autouse=True)
 def no_show(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     def refuse(*_: object, **__: object) -> None:

@@ -27,8 +27,7 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 
 
 @pytest.fixture(scope="module")
-def diagram() -> cf.Diagram:
-    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
+def diagram(orbit: cf.Orbit) -> cf.Diagram:
     return cf.explore(orbit, "Omega", (0.48, 0.55))
 
 

@@ -121,12 +121,6 @@ def test_line_styles_that_are_none(diagram: cf.Diagram, given: Any, message: str
 # ------------------------------------------------------------------------------------ insets
 
 
-@pytest.fixture(scope="module")
-def diagram() -> cf.Diagram:
-    orbit = cf.find_orbit("coulomb", {"Omega": 0.5, "S": 0.32, "S0": 0.4})
-    return cf.explore(orbit, "Omega", (0.4, 0.6))
-
-
 def labels(ax: Any) -> set[str]:
     return {t.get_text() for t in ax.texts if isinstance(t, Annotation) and t.get_text()}
 

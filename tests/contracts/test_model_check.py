@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.base.resources import bundled_dir
@@ -348,9 +349,7 @@ modes:
 
 
 def test_shifts_are_found_and_nothing_false_is(tmp_path: Path) -> None:
-    path = tmp_path / "broken.yaml"
-    path.write_text(BROKEN, encoding="utf-8")
-    model = cf.load_model(path)
+    model = typed(tmp_path, BROKEN)
     for params, image in (({}, "-x"), ({"a": 0.3}, "0.6 - x"), ({"a": -1.0, "S": 0.4}, "-2 - x")):
         report = ModelReport("broken")
         check_hidden(report, Probe(model, params))
@@ -458,9 +457,7 @@ modes:
 
 def test_an_end_of_derived_sliding_that_no_state_has_is_no_warning(tmp_path: Path) -> None:
     """Sliding ends where A cos(w t) = a - b, never at a + b; nobody wrote that surface."""
-    path = tmp_path / "twisting.yaml"
-    path.write_text(TWISTING, "utf-8")
-    said = str(check_model(cf.load_model(path)))
+    said = str(check_model(typed(tmp_path, TWISTING)))
     assert "no state was found on surface 'far'" in said
     assert "surface 'slide" not in said
 

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.cli import main
@@ -142,9 +143,7 @@ def test_another_package_offers_models_and_signatures(site: Path) -> None:
 
 @pytest.fixture(scope="module")
 def damped(tmp_path_factory: pytest.TempPathFactory) -> cf.Model:
-    path = tmp_path_factory.mktemp("models") / "damped.yaml"
-    path.write_text(YAML.format(name="damped"))
-    return cf.load_model(path)
+    return typed(tmp_path_factory.mktemp("models"), YAML.format(name="damped"))
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from typed import typed
 
 import contfric as cf
 from contfric.base.resources import bundled_dir
@@ -273,9 +274,7 @@ modes:
   c+: {in: {wall: +, ground: +}, field: {y: u, u: "F - S - C - (S + C - mu)/g", V: "(S + C - mu)/g"}}
   c-: {in: {wall: +, ground: -}, field: {y: u, u: "F - S - C - (S + C + mu)/g", V: "(S + C + mu)/g"}}
 """
-    path = tmp_path / "capsubot.yaml"
-    path.write_text(text, encoding="utf-8")
-    orbit = cf.find_orbit(path, {})
+    orbit = cf.find_orbit(typed(tmp_path, text), {})
     assert orbit.admissible and any(mode.startswith("slide_") for mode, _ in orbit.itinerary)
 
 
@@ -293,9 +292,7 @@ modes:
   up: {in: {signal: -}, field: {x: v, v: -0.6*v - x + 1}}
   down: {in: {x: +}, field: {x: v, v: -0.6*v - x - 1}}
 """
-    path = tmp_path / "relay.yaml"
-    path.write_text(text, encoding="utf-8")
-    orbit = cf.find_orbit(path, {})
+    orbit = cf.find_orbit(typed(tmp_path, text), {})
     assert orbit.admissible
     for end, (mode, _) in zip(orbit.ends, orbit.itinerary, strict=True):
         assert abs(end[1] + 0.1 * end[2]) == pytest.approx(0.2, abs=1e-12), mode

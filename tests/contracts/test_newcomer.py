@@ -17,16 +17,6 @@ PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 RANGES = {"Omega": (0.5, 0.6), "S": (0.3, 0.34)}
 
 
-@pytest.fixture(scope="module")
-def orbit() -> cf.Orbit:
-    return cf.find_orbit("coulomb", PARAMS)
-
-
-@pytest.fixture(scope="module")
-def diagram(orbit: cf.Orbit) -> cf.Diagram:
-    return cf.explore(orbit, "Omega", (0.48, 0.55))
-
-
 #: Things that are no number, no name, no list of what is wanted.
 ODD = [
     *(None, "x", "0.5", -1, 1.5, True, float("nan"), [], {}, [1, 2], ("a", "b")),

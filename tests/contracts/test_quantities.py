@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+from typed import typed
 
 matplotlib.use("Agg")
 
@@ -19,16 +20,6 @@ from contfric.models.language.quantity_texts import BUNDLED, LIST
 from contfric.quantities.registry import NAMED, quantity_of
 
 FIG5 = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
-
-
-@pytest.fixture(scope="module")
-def orbit() -> cf.Orbit:
-    return cf.solve_orbit("coulomb", "1a", FIG5)
-
-
-@pytest.fixture(scope="module")
-def branch(orbit: cf.Orbit) -> cf.Branch:
-    return cf.continue_orbit(orbit, "Omega", (0.4, 0.6))
 
 
 def test_the_list_of_names_is_one() -> None:
@@ -270,10 +261,8 @@ def test_a_file_declares_quantities(tmp_path: Path) -> None:
     ],
 )
 def test_a_mistake_in_a_file_has_its_line(tmp_path: Path, entry: str, words: str) -> None:
-    path = tmp_path / "damped.yaml"
-    path.write_text(f"{MODEL}  {entry}\n", encoding="utf-8")
     with pytest.raises(ModelError) as caught:
-        cf.load_model(path)
+        typed(tmp_path, f"{MODEL}  {entry}\n")
     assert words in str(caught.value)
 
 

@@ -25,21 +25,6 @@ from contfric.signature import load_signature
 PARAMS = {"Omega": 0.5, "S": 0.32, "S0": 0.4}
 
 
-@pytest.fixture(scope="module")
-def orbit() -> cf.Orbit:
-    return cf.find_orbit("coulomb", PARAMS)
-
-
-@pytest.fixture(scope="module")
-def branch(orbit: cf.Orbit) -> cf.Branch:
-    return cf.continue_orbit(orbit, "Omega", (0.45, 0.56))
-
-
-@pytest.fixture(scope="module")
-def diagram(orbit: cf.Orbit) -> cf.Diagram:
-    return cf.explore(orbit, "Omega", (0.45, 0.56))
-
-
 def assert_same(a: object, b: object) -> None:
     """Compare dataclasses to their last bit, field by field; shared systems by what they solve."""
     assert type(a) is type(b)

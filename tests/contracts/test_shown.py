@@ -20,16 +20,6 @@ RANGES = {"Omega": (0.53, 0.55), "S": (0.31, 0.33)}
 
 
 @pytest.fixture(scope="module")
-def orbit() -> cf.Orbit:
-    return cf.find_orbit("coulomb", PARAMS)
-
-
-@pytest.fixture(scope="module")
-def diagram(orbit: cf.Orbit) -> cf.Diagram:
-    return cf.explore(orbit, "Omega", (0.5, 0.545))
-
-
-@pytest.fixture(scope="module")
 def found(orbit: cf.Orbit, diagram: cf.Diagram, tmp_path_factory: Any) -> dict[str, Any]:
     """Return one object of every class that is shown, by the name of its class."""
     pytest.importorskip("flint")

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from pages import DOCS, ROOT, blocks
+from typed import typed
 
 import contfric
 from contfric.cli.parser import parse
@@ -175,9 +176,7 @@ def test_notebooks_say_what_they_say(path: Path) -> None:
 def test_the_model_on_the_first_page_is_one(tmp_path: Path) -> None:
     text = (DOCS / "index.md").read_text(encoding="utf-8")
     (found,) = [b for b in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL) if "modes:" in b]
-    path = tmp_path / "bilinear.yaml"
-    path.write_text(found, encoding="utf-8")
-    model = contfric.load_model(path)
+    model = typed(tmp_path, found)
     assert [d.name for d in model.domains] == ["pressed+", "pressed-", "free+", "free-"]
     assert model.transitions["pressed-", "contact"] == "free-"
 

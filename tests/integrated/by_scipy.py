@@ -1,12 +1,44 @@
-"""Motion of `popp` and of `belt` by an integrator of scipy, which shares nothing with contfric."""
+"""Solutions by an integrator of scipy, which shares nothing with contfric; those of `popp` and `belt`."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import cos
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+
+#: Accuracy where a test does not ask for another one.
+_TIGHT: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+
+
+def after(field: Any, start: Any, span: tuple[float, float], **options: Any) -> np.ndarray:
+    """Return the state at the end of a span."""
+    return np.asarray(solve_ivp(field, span, start, **(_TIGHT | options)).y[:, -1])
+
+
+def met(
+    field: Any,
+    start: Any,
+    event: Any,
+    direction: float = 0.0,
+    span: tuple[float, float] = (0.0, 200.0),
+    **options: Any,
+) -> tuple[float, np.ndarray]:
+    """Return time and state where an event is met in a direction (0: in either), at the latest at the end."""
+    event.terminal, event.direction = True, direction
+    run = solve_ivp(field, span, start, events=event, **(_TIGHT | options))
+    return float(run.t[-1]), run.y[:, -1]
+
+
+def misses(orbit: Any, field_of: Callable[[str], Any]) -> float:
+    """Return how far the segments of an orbit, each along the field of its mode, end from its joints."""
+    ways = zip(orbit.itinerary, orbit.begins, orbit.ends, strict=True)
+    return max(
+        float(np.max(np.abs(after(field_of(mode), begin[1:], (begin[0], end[0])) - end[1:])))
+        for (mode, _), begin, end in ways
+    )
 
 
 def integrated(f: Any, y0: Any, span: tuple[float, float], until: Any = None) -> np.ndarray:

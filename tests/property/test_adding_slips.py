@@ -66,9 +66,7 @@ def test_where_a_slide_without_length_lies_between_a_hold_and_a_rest(
     omega: float, s: float, c: float, tmp_path: Path
 ) -> None:
     """Without symmetry a touch is alone; no surface parts the rest after it."""
-    path = tmp_path / "one_sided.yaml"
-    path.write_text(ASYMMETRIC)
-    orbit = cf.find_orbit(path, {"W": omega, "S": s, "c": c})
+    orbit = cf.find_orbit(typed(tmp_path, ASYMMETRIC), {"W": omega, "S": s, "c": c})
     diagram = cf.explore(orbit, "W", (0.85 * omega, 1.15 * omega), max_branches=4)
     assert len(diagram.branches) > 1
     for branch in diagram.branches:

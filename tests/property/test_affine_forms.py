@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy
-from scipy.integrate import solve_ivp
+from by_scipy import after
 
 import contfric as cf
 from contfric.models.generated.affine import affine_form
@@ -123,7 +123,6 @@ def test_a_model_may_have_modes_of_both_kinds() -> None:
 
     start = orbit.cycle[0]
     # the field is smooth to its second derivative at the contact
-    span = (start[0], start[0] + orbit.period)
-    end = solve_ivp(field, span, start[1:], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    end = after(field, start[1:], (start[0], start[0] + orbit.period))
     assert np.max(np.abs(end - start[1:])) < 1e-9
     assert orbit.converged and orbit.admissible

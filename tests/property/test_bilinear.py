@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
 from typed import typed
 
 import contfric as cf
@@ -34,16 +34,7 @@ def period_map(start, omega):
         return y[1], -y[0] - 0.1 * y[1] - force + np.cos(omega * t)
 
     # the kink at contact is passed with small steps: the field is continuous there
-    found = solve_ivp(
-        field,
-        (0.0, 2 * np.pi / omega),
-        start,
-        method="DOP853",
-        rtol=1e-11,
-        atol=1e-12,
-        max_step=0.01,
-    )
-    return found.y[:, -1]
+    return after(field, start, (0.0, 2 * np.pi / omega), max_step=0.01)
 
 
 def test_the_doubling_is_one(diagram):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 from contfric.errors import ModelError, ParameterError
@@ -40,9 +41,7 @@ IMPACT = "v: (1 + e)*a*cos(t) - e*v"
 
 
 def ball(folder: Path, reset: str = IMPACT) -> cf.Model:
-    path = folder / "ball.yaml"
-    path.write_text(BALL.format(reset=reset), encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, BALL.format(reset=reset))
 
 
 def impacts_of(a: float, e: float, t: float, v: float) -> list[tuple[mp.mpf, mp.mpf]]:
@@ -336,9 +335,7 @@ spread: {x: 0.5, v: 1}
 
 
 def test_a_pair_of_gears_rests_on_both_flanks(tmp_path: Path) -> None:
-    path = tmp_path / "gear.yaml"
-    path.write_text(GEAR, encoding="utf-8")
-    orbit = cf.find_orbit(path, {})
+    orbit = cf.find_orbit(typed(tmp_path, GEAR), {})
     assert orbit.symmetric and orbit.admissible
     kinds = [mode for mode, _ in orbit.itinerary]
     assert sorted(kinds) == ["chatter_left", "chatter_right", "free", "free"]
@@ -385,9 +382,7 @@ spread: {z: 0.5, w: 1, q: 1}
 
 @pytest.mark.parametrize("seed", [0, 1, 4, 5, 6, 7, 13, 14])
 def test_flights_between_two_walls_of_one_observable(seed: int, tmp_path: Path) -> None:
-    path = tmp_path / "capsule.yaml"
-    path.write_text(CAPSULE, encoding="utf-8")
-    model, draw = cf.load_model(path), np.random.default_rng(seed)
+    model, draw = typed(tmp_path, CAPSULE), np.random.default_rng(seed)
     p = {"Om": float(draw.uniform(2.5, 3.2)), "g": float(draw.uniform(0.05, 0.25))}
     p["r"] = float(draw.uniform(0.1, 0.65))
     walk = cf.simulate(model, p, state=[0.1, 0.0, 0.0], periods=1000, events=10**6)
@@ -431,8 +426,6 @@ def test_where_flights_shrink_to_nothing_the_mass_rests_for_ever(seed: int, tmp_
     draw = np.random.default_rng(seed)
     k, c = float(draw.uniform(0.1, 0.5)), float(draw.uniform(0.0, 0.2))
     pre, e = float(draw.uniform(0.4, 0.7)), float(draw.uniform(0.2, 0.5))
-    path = tmp_path / "follower.yaml"
-    path.write_text(FOLLOWER.format(k=k, c=c, pre=pre, e=e), encoding="utf-8")
     phase = np.linspace(0.0, 2.0 * np.pi, 200_001)
 
     def pressed(w: float) -> float:  # the least force of a follower that stays on x = cos(w t)
@@ -440,7 +433,11 @@ def test_where_flights_shrink_to_nothing_the_mass_rests_for_ever(seed: int, tmp_
         return float(force.min())
 
     leaves = brentq(pressed, 0.3, 2.0)
-    orbit = cf.find_orbit(path, {"W": 1.05 * leaves}, state=[1.1, 0.0])
+    orbit = cf.find_orbit(
+        typed(tmp_path, FOLLOWER.format(k=k, c=c, pre=pre, e=e)),
+        {"W": 1.05 * leaves},
+        state=[1.1, 0.0],
+    )
     for step in (
         0.01,
         0.0031,

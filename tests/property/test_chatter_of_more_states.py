@@ -12,6 +12,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -50,9 +51,7 @@ def limit(p: dict[str, mp.mpf], t: mp.mpf, y: list[mp.mpf]) -> list[mp.mpf]:
 
 @pytest.fixture(scope="module")
 def followed(tmp_path_factory) -> cf.Model:
-    path = tmp_path_factory.mktemp("followed") / "followed.yaml"
-    path.write_text(FOLLOWED, encoding="utf-8")
-    return cf.load_model(path)
+    return typed(tmp_path_factory.mktemp("followed"), FOLLOWED)
 
 
 @pytest.mark.parametrize("seed", range(10))

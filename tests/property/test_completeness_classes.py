@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import restarts
 from report import Tally
+from typed import typed
 
 import contfric as cf
 from contfric.atlas.completeness.balance import _solved_at
@@ -565,9 +566,7 @@ resets: {fire: {x: -0.3, y: 0.2}}
 
 
 def test_where_a_firing_comes_in_the_sum_of_indices_jumps(tmp_path: Path) -> None:
-    path = tmp_path / "resonator.yaml"
-    path.write_text(FIRES, encoding="utf-8")
-    diagram = cf.explore(cf.find_orbit(path, {}), "W", (0.8, 1.0))
+    diagram = cf.explore(cf.find_orbit(typed(tmp_path, FIRES), {}), "W", (0.8, 1.0))
     assert [b.kind.value for b in diagram.bifurcations] == ["GS"]  # below it the neuron fires twice
     found = diagram.verify()
     assert found.passed and [b.below for b in found.balances] == [None]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -41,9 +42,7 @@ def test_a_contact_that_never_slips_at_the_defaults_slips_at_other_parameters(
 ) -> None:
     draw = np.random.default_rng(seed)
     friction, c = draw.uniform(0.65, 0.95), draw.uniform(0.1, 0.5)
-    file = tmp_path / "dragged.yaml"
-    file.write_text(DRAGGED.format(default=draw.uniform(1.2, 3.0), c=c))
-    model = cf.load_model(file)
+    model = typed(tmp_path, DRAGGED.format(default=draw.uniform(1.2, 3.0), c=c))
     assert model.filippov
     with caplog.at_level(logging.WARNING):
         orbit = cf.find_orbit(model, {"S": friction})

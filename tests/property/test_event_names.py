@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 
@@ -144,8 +145,6 @@ def test_two_surfaces_that_one_tangency_meets_at_once_are_no_corner(tmp_path, up
     From rest at y = 1 and back: with r(k) = exp(-pi c/(2 w)), w^2 = k - c^2/4, the share of a height over the
     balance that is left half a turn later, (g/k (1 + r(k)) - g/up) r(up) = g/up.
     """
-    path = tmp_path / "hopper.yaml"
-    path.write_text(HOPPER)
 
     def decay(k: float) -> float:
         return float(np.exp(-0.5 * np.pi / np.sqrt(k - 0.25)))
@@ -155,7 +154,7 @@ def test_two_surfaces_that_one_tangency_meets_at_once_are_no_corner(tmp_path, up
         return (lowest - 1.0 / k) * decay(k) - 1.0 / k
 
     at = brentq(mismatch, 21.0, 35.0, xtol=1e-13)
-    orbit = cf.find_orbit(cf.load_model(path), {"up": up}, state=[1.3, 0.0])
+    orbit = cf.find_orbit(typed(tmp_path, HOPPER), {"up": up}, state=[1.3, 0.0])
     branch = cf.continue_orbit(orbit, "up", (20.5, 36.0))
     events = [b for b in branch.bifurcations if b.tests]
     assert [b.kind.value for b in events] == ["GS"]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.simulation.starts import displaced, start_of
@@ -124,9 +125,7 @@ def text_of(field: str, surfaces: str, modes: str) -> str:
 def test_where_extrema_can_be_is_derived(
     field: str, surfaces: str, modes: str, stop: str, displacement: str, tmp_path: Path
 ) -> None:
-    path = tmp_path / "plain.yaml"
-    path.write_text(text_of(field, surfaces, modes), encoding="utf-8")
-    model = cf.load_model(path)
+    model = typed(tmp_path, text_of(field, surfaces, modes))
     assert (model.stop_surface, model.displacement) == (stop, displacement)
     if displacement:
         assert displacement in [o.name for o in model.observables]
@@ -171,9 +170,7 @@ modes:
 
 
 def test_a_start_is_found_where_the_first_one_is_in_no_domain(tmp_path: Path) -> None:
-    path = tmp_path / "softstop.yaml"
-    path.write_text(SOFT_STOP, encoding="utf-8")
-    model = cf.load_model(path)
+    model = typed(tmp_path, SOFT_STOP)
     vector = model.vector({})
     mode, _ = start_of(model, 0.0, np.array([1.0, 0.0]), vector, None)
     assert model.modes[mode].name == "out-"  # at rest in equilibrium, until the force falls

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 
@@ -24,9 +25,7 @@ spread: {{x: 1, y: 1}}
 
 
 def welander(folder: Path, rate: float, a: float, b: float, k: float, eps: float) -> cf.Model:
-    path = folder / f"welander-{rate:g}.yaml"
-    path.write_text(WELANDER.format(rate=rate, a=a, b=b, k=k, eps=eps), encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, WELANDER.format(rate=rate, a=a, b=b, k=k, eps=eps))
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
+from typed import typed
 
 import contfric as cf
 from contfric.base.arrays import FloatArray
@@ -87,8 +88,6 @@ def lowest(joint: FloatArray, p: dict[str, float], until: float) -> float:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_heights_after_an_impact(seed: int, tmp_path: Path) -> None:
-    path = tmp_path / "walls.yaml"
-    path.write_text(WALLS)
     rng = np.random.default_rng([45, seed])
     params = {
         "w": float(rng.uniform(0.8, 1.2)),
@@ -101,7 +100,7 @@ def test_heights_after_an_impact(seed: int, tmp_path: Path) -> None:
     reach = 1.0 / abs(1.0 - params["w"] ** 2 + 2j * params["zeta"] * params["w"])
     params["F"] = 1.3 * params["d"] / reach
     params["far"] = 3.0 * params["d"]
-    orbit = cf.find_orbit(path, params, longest=2000)
+    orbit = cf.find_orbit(typed(tmp_path, WALLS), params, longest=2000)
     tests = [t for t in orbit.system.tests if t.margin is Margin.INTERIOR and t.surface == "left"]
     assert tests
     for test in tests:
@@ -134,11 +133,9 @@ def along_orbits(orbit: cf.Orbit, k: int, active: int) -> float:
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 5])  # 4 is aperiodic
 def test_margins_along_orbits(seed: int, tmp_path: Path) -> None:
-    path = tmp_path / "floors.yaml"
-    path.write_text(BRACED)
     rng = np.random.default_rng([46, 2 * seed])
     params = {name: float(rng.uniform(*ends)) for name, ends in RANGES.items()}
-    orbit = cf.find_orbit(path, params, longest=400)
+    orbit = cf.find_orbit(typed(tmp_path, BRACED), params, longest=400)
     compared = set()
     for name in RANGES:
         active = orbit.model.index_of(name)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.events.bifurcation import Kind
@@ -71,8 +72,6 @@ def test_restarts_agree_at_a_graze_of_one_wall(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_restarts_agree_at_a_graze_of_both_walls(seed: int, tmp_path: Path) -> None:
-    path = tmp_path / "double.yaml"
-    path.write_text(DOUBLE)
     rng = np.random.default_rng([44, seed])
     params = {
         "w": float(rng.uniform(0.6, 1.6)),
@@ -84,6 +83,6 @@ def test_restarts_agree_at_a_graze_of_both_walls(seed: int, tmp_path: Path) -> N
     stiffness = 1.0 - w**2 + 2j * params["zeta"] * w
     graze = params["d"] * abs(stiffness)
     state = smooth(0.98 * graze / stiffness, w)
-    orbit = cf.find_orbit(path, params | {"F": 0.98 * graze}, state=state)
+    orbit = cf.find_orbit(typed(tmp_path, DOUBLE), params | {"F": 0.98 * graze}, state=state)
     diagram = cf.explore(orbit, "F", (0.9 * graze, 1.1 * graze), max_periods=2)
     agrees(diagram, graze, "F")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from mpmath import findroot, mp, mpf
 from numpy.random import default_rng
+from typed import typed
 
 import contfric as cf
 
@@ -23,8 +24,6 @@ resets: {wall: {v: -r*v}}
 def test_a_grazing_impact_is_proved_where_the_response_reaches_the_wall(tmp_path, seed) -> None:
     """The orbit of one impact ends where the response without impacts has the amplitude of the wall."""
     rng = default_rng(seed)
-    path = tmp_path / "hopper.yaml"
-    path.write_text(HOPPER)
     d, r, zeta = rng.uniform(0.25, 0.6), rng.uniform(0.5, 0.9), rng.uniform(0.02, 0.2)
     with mp.workdps(60):
         wall, damping = mpf(float(d)), mpf(float(zeta))
@@ -35,7 +34,9 @@ def test_a_grazing_impact_is_proved_where_the_response_reaches_the_wall(tmp_path
         w = float(touches) + 0.02
         response = 1 / (1 - w * w + 2j * zeta * w)
         state = [response.real, (1j * w * response).real]
-        start = cf.find_orbit(path, {"w": w, "d": d, "r": r, "zeta": zeta}, state=state)
+        start = cf.find_orbit(
+            typed(tmp_path, HOPPER), {"w": w, "d": d, "r": r, "zeta": zeta}, state=state
+        )
         diagram = cf.explore(start, "w", (w - 0.05, w), max_branches=6)
         found = [event.certify() for event in diagram.bifurcations if event.kind == "GS"]
         assert found and all(proof.proved for proof in found), [proof.why for proof in found]
@@ -45,9 +46,7 @@ def test_a_grazing_impact_is_proved_where_the_response_reaches_the_wall(tmp_path
 
 def test_a_segment_that_is_the_whole_orbit_touches_at_both_ends(tmp_path) -> None:
     """Its first rates vanish before the touch and after it."""
-    path = tmp_path / "hopper.yaml"
-    path.write_text(HOPPER)
-    branch = cf.continue_orbit(cf.find_orbit(path, {"w": 1.5}), "w", (1.4, 2.5))
+    branch = cf.continue_orbit(cf.find_orbit(typed(tmp_path, HOPPER), {"w": 1.5}), "w", (1.4, 2.5))
     (event,) = (end.bifurcation for end in branch.ends if end.bifurcation is not None)
     assert event.kind == "GS" and len(event.orbit.joints) == 1
     assert event.certify().proved

@@ -17,8 +17,7 @@ from catalogue import stationary as kernel
 from harmonic_sum import definition
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-
-import contfric as cf
+from typed import typed
 
 SUM = 2
 #: Values within this of the level are decided by rounding (sums here are of order 1 to 10).
@@ -71,9 +70,7 @@ def search(request, tmp_path_factory):
             lambda a, t0, dt, y1: hit(REST, SUM, 0.0, False, t0, np.zeros(2), dt, at(a), y1),
             lambda a, t0, dt, *out: kernel(REST, SUM, t0, np.zeros(2), dt, at(a), *out),
         )
-    path = tmp_path_factory.mktemp("models") / "harmonic-sum.yaml"
-    path.write_text(json.dumps(definition(HARMONICS)))
-    model = cf.load_model(path)
+    model = typed(tmp_path_factory.mktemp("models"), json.dumps(definition(HARMONICS)))
     flow = model.flow
     assert not model.integrated
     return (

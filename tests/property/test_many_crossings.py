@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typed import typed
 
 import contfric as cf
 
@@ -32,9 +33,10 @@ def _reversals(orbit: cf.Orbit, harmonic: int) -> int:
 
 @pytest.mark.parametrize("harmonic", [3, 13, 29, 33, 41, 61, 101])
 def test_every_crossing_is_in_the_signature(harmonic: int, tmp_path: Path) -> None:
-    file = tmp_path / "many.yaml"
-    file.write_text(_WALLS.replace("cos(3*w*t", f"cos({harmonic}*w*t"))
-    orbit = cf.find_orbit(file, {**_PARAMETERS, "a": 3.0})
+    orbit = cf.find_orbit(
+        typed(tmp_path, _WALLS.replace("cos(3*w*t", f"cos({harmonic}*w*t")),
+        {**_PARAMETERS, "a": 3.0},
+    )
     assert len(orbit.signature.segments) == _reversals(orbit, harmonic)
     branch = cf.continue_orbit(orbit, "a", (2.9, 3.1))
     assert np.array_equal(

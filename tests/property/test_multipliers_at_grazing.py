@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 
@@ -224,9 +225,7 @@ def test_a_slider_that_only_touches_its_limit_has_the_limit_of_those_that_slip(s
 def test_a_cycle_that_only_touches_a_spring_has_the_multiplier_of_the_free_one(
     tmp_path: Path,
 ) -> None:
-    path = tmp_path / "cycle.yaml"
-    path.write_text(VAN_DER_POL)
-    start = cf.find_orbit(path, {"d": 2.1})
+    start = cf.find_orbit(typed(tmp_path, VAN_DER_POL), {"d": 2.1})
     found = cf.explore(start, "d", (1.95, 2.1), max_periods=1)
     event = next(b for b in found.bifurcations if b.kind is cf.Kind.GS)
     ends = at_grazing(found, "d", event.params["d"])

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
-
-import contfric as cf
+from typed import typed
 
 MODEL = """
 name: drifting
@@ -32,9 +31,7 @@ def test_first_hits_are_those_of_dense_samples(tmp_path, seed: int) -> None:
     a, b = rng.uniform(0.05, 1.0), rng.uniform(0.0, 0.5)
     c, k = rng.uniform(0.5, 3.0), rng.uniform(1.0, 4.0)
     observable, level = OBSERVABLES[seed % len(OBSERVABLES)], rng.uniform(-0.3, 0.3)
-    path = tmp_path / "drifting.yaml"
-    path.write_text(MODEL.format(a=a, b=b, c=c, k=k, observable=observable, level=level))
-    model = cf.load_model(path)
+    model = typed(tmp_path, MODEL.format(a=a, b=b, c=c, k=k, observable=observable, level=level))
     assert model.closed_form
     view = model.view(model.vector({}))
     whole = np.array([[0.0, 1.0, c], [-b, -a, 0.0], [0.0, 0.0, 0.0]])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.events.incident.partial_touches import _choices
@@ -29,10 +30,8 @@ modes:
 @pytest.mark.parametrize("seed", range(6))
 def test_indices_balance_where_a_preloaded_stop_is_touched(seed: int, tmp_path: Path) -> None:
     """The linear oscillator's amplitude is the gap there; beyond it the map has a square root."""
-    path = tmp_path / "stop.yaml"
-    path.write_text(STOP)
     draw = np.random.default_rng([612, seed])
-    model = cf.load_model(path)
+    model = typed(tmp_path, STOP)
     moved = {name: float(v * draw.uniform(0.95, 1.05)) for name, v in model.defaults.items()}
     w, zeta = moved["omega"], moved["zeta"]
     touch = moved["gap"] * abs(1.0 - w**2 + 2j * zeta * w)

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from by_scipy import met
 from flint import arb
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from typed import typed
 
 import contfric as cf
 from contfric.certify.equations.chain import Chain, segments_of
@@ -42,9 +43,7 @@ resets:
 
 @cache
 def model(folder: Path) -> cf.Model:
-    path = folder / "friction-and-wall.yaml"
-    path.write_text(MODEL, encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, MODEL)
 
 
 def scene(seed: int, place: float = 0.0) -> dict[str, float]:
@@ -82,10 +81,7 @@ def furthest(p: dict[str, float], periods: float) -> float:
         def stops(time: float, y: np.ndarray, sign: int = sign, begins: float = t) -> float:
             return sign * y[1] if time > begins + 1e-6 else 1.0
 
-        stops.terminal = True  # type: ignore[attr-defined]
-        span = (t, t + 4 * math.pi / w)
-        run = solve_ivp(rates, span, [x, 0.0], "DOP853", events=stops, rtol=1e-12, atol=1e-13)
-        t, x = float(run.t[-1]), float(run.y[0, -1])
+        t, (x, _) = met(rates, [x, 0.0], stops, span=(t, t + 4 * math.pi / w))
         if t > 0.8 * end:
             best = max(best, x)
     return best

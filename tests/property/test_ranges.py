@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
+from typed import typed
 
 import contfric as cf
 from contfric.errors import ModelError
@@ -42,9 +43,7 @@ resets: {threshold: {V: -50}}
 
 
 def written(folder: Path, text: str, spread: str = "") -> cf.Model:
-    path = folder / "model.yaml"
-    path.write_text(text + (f"spread: {spread}\n" if spread else ""), encoding="utf-8")
-    return cf.load_model(path)
+    return typed(folder, text + (f"spread: {spread}\n" if spread else ""))
 
 
 def pulsed(p: dict[str, float], y: np.ndarray) -> np.ndarray:
@@ -54,8 +53,8 @@ def pulsed(p: dict[str, float], y: np.ndarray) -> np.ndarray:
         s, infectives = y[0], math.exp(y[1])
         return [p["m"] - p["b"] * s * infectives - p["m"] * s, p["b"] * s - p["m"] - p["g"]]
 
-    after = solve_ivp(field, (0, p["Tv"]), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    return np.array([(1 - p["p"]) * after[0], after[1]])
+    s, infectives = after(field, y, (0, p["Tv"]))
+    return np.array([(1 - p["p"]) * s, infectives])
 
 
 @pytest.mark.parametrize(("p", "period"), [(0.5, 2.0), (0.505, 2.02), (0.4, 1.5)])
@@ -165,5 +164,5 @@ resets: {drop: {m: q*m, v: 0, x: 0.2}}
         return [y[1], fall, params["R"]]
 
     start = [0.2, 0.0, params["q"] * m]
-    after = solve_ivp(field, (0, orbit.period), start, method="DOP853", rtol=1e-12, atol=1e-14)
-    np.testing.assert_allclose(after.y[:, -1], [x, v, m], rtol=1e-9)
+    end = after(field, start, (0, orbit.period), atol=1e-14)
+    np.testing.assert_allclose(end, [x, v, m], rtol=1e-9)

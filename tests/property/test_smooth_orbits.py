@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
+from typed import typed
 
 import contfric as cf
 from contfric.models.shorthand.chatter import with_chatter
@@ -118,8 +119,7 @@ def test_a_smooth_orbit_of_several_modes_doubles() -> None:
         return y[1], -2.0 * p["zeta"] * y[1] - pull + p["e"] * np.cos(omega * t)
 
     def turn(start: np.ndarray) -> np.ndarray:
-        span = (0.0, 2.0 * np.pi / omega)
-        return solve_ivp(field, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return after(field, start, (0.0, 2.0 * np.pi / omega))
 
     start = doubling.orbit.state(0.0)
     assert np.abs(turn(start) - start).max() < 1e-9
@@ -130,13 +130,17 @@ def test_a_smooth_orbit_of_several_modes_doubles() -> None:
 
 def test_a_model_needs_no_surface_at_all(tmp_path: Path) -> None:
     """The Duffing oscillator: its folds, held against a shooting method of scipy's."""
-    path = tmp_path / "duffing.yaml"
-    path.write_text(
-        "name: duffing\nstates: [x, v]\nparameters: {w: 1.2, zeta: 0.05, A: 0.3}\nperiod: 2*pi/w\n"
-        "field: {x: v, v: -x - x**3 - 2*zeta*v + A*cos(w*t)}\n",
-        encoding="utf-8",
+    branch = cf.continue_orbit(
+        cf.find_orbit(
+            typed(
+                tmp_path,
+                "name: duffing\nstates: [x, v]\nparameters: {w: 1.2, zeta: 0.05, A: 0.3}\nperiod: 2*pi/w\n"
+                "field: {x: v, v: -x - x**3 - 2*zeta*v + A*cos(w*t)}\n",
+            )
+        ),
+        "w",
+        (1.0, 2.0),
     )
-    branch = cf.continue_orbit(cf.find_orbit(path), "w", (1.0, 2.0))
     folds = [b for b in branch.bifurcations if b.kind is cf.Kind.SN]
     assert len(folds) == 2
     for fold in folds:
@@ -146,8 +150,7 @@ def test_a_model_needs_no_surface_at_all(tmp_path: Path) -> None:
             return y[1], -y[0] - y[0] ** 3 - 0.1 * y[1] + 0.3 * np.cos(w * t)
 
         def turn(start: np.ndarray, w: float = w) -> np.ndarray:
-            span = (0.0, 2.0 * np.pi / w)
-            return solve_ivp(field, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+            return after(field, start, (0.0, 2.0 * np.pi / w))
 
         start = fold.orbit.state(0.0)
         assert np.abs(turn(start) - start).max() < 1e-9
@@ -193,12 +196,11 @@ def test_labels_leave_the_phase_out() -> None:
 
 def test_regions_may_have_names_of_their_own(tmp_path: Path) -> None:
     text = (MODELS / "soft_stops.yaml").read_text(encoding="utf-8")
-    path = tmp_path / "named.yaml"
-    path.write_text(
-        text + "domains: {middle: {mode: free, in: {right: -, left: +}}}\n", encoding="utf-8"
-    )
     size = amplitude({"omega": 0.5, "zeta": 0.05, "A": 1.0})
-    orbit = cf.find_orbit(path, {"omega": 0.5, "k": 1.0, "gap": 0.7 * size})
+    orbit = cf.find_orbit(
+        typed(tmp_path, text + "domains: {middle: {mode: free, in: {right: -, left: +}}}\n"),
+        {"omega": 0.5, "k": 1.0, "gap": 0.7 * size},
+    )
     assert str(orbit.signature) == "pressed -> middle -> drawn -> middle"
 
 

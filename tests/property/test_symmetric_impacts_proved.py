@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.bvp.system import build_system
@@ -54,9 +55,7 @@ MODELS = {"free": FREE, "rubbing": RUBBING}
 
 def loaded(folder: Path, name: str, right: str = "-r*v", left: str = "-r*v") -> cf.Model:
     """Return a mass between two walls, with these velocities after the impacts."""
-    path = folder / f"{name}.yaml"
-    path.write_text(MODELS[name].format(name=name, right=right, left=left))
-    return cf.load_model(path)
+    return typed(folder, MODELS[name].format(name=name, right=right, left=left))
 
 
 def half_orbit(model: cf.Model, seed: int) -> cf.Orbit:

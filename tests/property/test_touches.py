@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from by_scipy import after
 from scipy.optimize import fsolve
+from typed import typed
 
 import contfric as cf
 from contfric.orbit.canonical.section_crossings import every_crossing
@@ -87,8 +88,7 @@ def motion(start: list[float], until: float, params: dict[str, float]) -> np.nda
     def field(t: float, y: np.ndarray) -> tuple[float, float]:
         return y[1], acceleration(params, t, y)
 
-    run = solve_ivp(field, (0.0, until), start, method="DOP853", rtol=1e-12, atol=1e-13)
-    return run.y[:, -1]
+    return after(field, start, (0.0, until))
 
 
 def test_the_places_of_touches_by_another_integrator() -> None:
@@ -191,9 +191,7 @@ def variant(tmp_path: Path, field: str, more: str = "") -> cf.Model:
         f"surfaces:\n  s: {{observable: v, level: 0}}\n  g: {{observable: x, level: 1}}\n{field}\n"
         f"modes:\n  up: {{in: {{s: +}}}}\n  down: {{in: {{s: -}}{more}}}\nspread: {{x: 1, v: 1}}\n"
     )
-    path = tmp_path / "variant.yaml"
-    path.write_text(text)
-    return cf.load_model(path)
+    return typed(tmp_path, text)
 
 
 def test_what_differs_in_a_derivative_or_at_other_parameters_is_not_one_field(

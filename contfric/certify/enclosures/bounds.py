@@ -13,7 +13,7 @@ from flint import arb, arb_mat
 
 from contfric.base.arrays import FloatArray
 from contfric.certify.enclosures.krawczyk import approximate_inverse
-from contfric.models.balls.numbers import Vector, around, column
+from contfric.models.balls.numbers import Vector, around, column, identity
 
 #: Upper bounds are rounded to floats and multiplied by this.
 _UP = 1.0 + 1e-12
@@ -65,7 +65,7 @@ class Bounds:
     @classmethod
     def _with(cls, matrices: list[arb_mat], inverse: arb_mat, turn: arb_mat, half: float) -> Bounds:
         size = matrices[0].nrows()
-        one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+        one = identity(size)
         slope, rest = inverse * matrices[1], upper(inverse * matrices[2])
         either = np.eye(size) + half * upper(turn)
         gap = either @ (upper(one - inverse * matrices[0]) + rest)

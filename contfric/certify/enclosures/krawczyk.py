@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from flint import arb, arb_mat
 
 from contfric.certify.verdict import Verdict
-from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, identity, numbers
 
 #: Residual and Jacobian of a system of equations.
 Equations = Callable[[Vector], tuple[Vector, arb_mat]]
@@ -55,9 +55,8 @@ class Inclusion:
 def approximate_inverse(jacobian: arb_mat) -> arb_mat | None:
     """Return an approximate inverse without error bounds; None where it is not finite."""
     middle, size = jacobian.mid(), jacobian.nrows()
-    identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
     try:
-        inverse = middle.solve(identity, algorithm="approx")
+        inverse = middle.solve(identity(size), algorithm="approx")
     except ZeroDivisionError:
         return None
     return inverse.mid() if all(x.is_finite() for x in inverse.entries()) else None
@@ -88,8 +87,7 @@ def krawczyk(
     _, wide = equations(box)
     offset = column([arb(0, r.abs_upper()) for r in radii])
     size = len(centre)
-    identity = arb_mat([[int(i == j) for j in range(size)] for i in range(size)])
-    spread = (identity - inverse * wide) * offset
+    spread = (identity(size) - inverse * wide) * offset
     moved = numbers(spread - inverse * column(residual))
     if all(k.abs_upper() < r.abs_lower() for k, r in zip(moved, radii, strict=True)):
         zero = [c + k for c, k in zip(centre, moved, strict=True)]

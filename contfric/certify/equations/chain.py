@@ -39,7 +39,7 @@ class Segments:
     modes : mode of each segment
     exits : surface that each segment ends on; empty for a hold
     pins : condition at the start of each hold: a surface, or (mode, surface) whose rate vanishes; else None
-    resets : surface of the reset that each segment begins behind; empty without one
+    resets : surface of the reset that each segment begins after; empty without one
     closure : state matrix of the closure, whole numbers or floats
     turn : duration of a turn in periods of the excitation; 0 without excitation
     kept : what it keeps, in the place of one equation each

@@ -33,7 +33,7 @@ from contfric.certify.enclosures.krawczyk import Equations
 from contfric.certify.equations.chain import Chain, Segments
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.models.balls.numbers import Vector, column, dot, numbers
 from contfric.orbit.orbit import Orbit
 
 #: Returns the model at a value of the free parameter.
@@ -139,8 +139,8 @@ def with_multiplier(
         nothing = [arb(0)] * size
         residual = list(residual)
         for row in turned:
-            residual.append(sum((a * b for a, b in zip(row[:size], phi, strict=True)), arb(0)))
-        residual.append(sum((a * b for a, b in zip(functional, phi, strict=True)), arb(0)) - 1)
+            residual.append(dot(row[:size], phi))
+        residual.append(dot(functional, phi) - 1)
         matrix = [[*row[:size], *nothing, row[-1]] for row in rows]
         matrix += [
             [*curved[:size], *row[:size], curved[-1]]
@@ -192,9 +192,7 @@ def with_pair(segments: Segments, build: Builder, functional: Vector) -> Equatio
             )
             matrix += [[*row[:size], *u, *v, at, on, row[-1]] for row, u, v, at, on in tables]
         for phi, wanted in ((a, 1), (b, 0)):
-            residual.append(
-                sum((f * u for f, u in zip(functional, phi, strict=True)), arb(0)) - wanted
-            )
+            residual.append(dot(functional, phi) - wanted)
         matrix.append([*nothing, *functional, *nothing, arb(0), arb(0), arb(0)])
         matrix.append([*nothing, *nothing, *functional, arb(0), arb(0), arb(0)])
         residual.append(c * c + s * s - 1)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from flint import arb, arb_mat
 
 from contfric.certify.equations.chain import Chain
-from contfric.models.balls.numbers import Vector, column
+from contfric.models.balls.numbers import Vector, column, identity
 
 
 def monodromy(chain: Chain, joints: list[Vector]) -> arb_mat | None:
@@ -44,7 +44,7 @@ def _passing(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
     last = i + 1 == segments.count
     row, field = model.surfaces[segments.exits[i]], model.fields[segments.modes[i]]
     closure = arb_mat([[arb(c) for c in line] for line in segments.closure])
-    one = arb_mat([[int(a == b) for b in range(n)] for a in range(n)])
+    one = identity(n)
     closes = last and closure != one
     at = joints[i + 1] if closes else joints[(i + 1) % segments.count]
     state = column(model.extended(at[0], at[1:]))

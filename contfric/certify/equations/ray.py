@@ -19,7 +19,7 @@ from contfric.certify.enclosures.affine import AffineMatrix, enclosing
 from contfric.certify.equations.chain import Chain, Segments, block_exponential
 from contfric.certify.equations.kept import keep_residual, keep_rows
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, around, column, zeros
+from contfric.models.balls.numbers import Vector, around, column, identity, zeros
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +222,7 @@ class Ray:
         rest = matrix * (slack + duration - middle) + (matrix * change - slope) * self.half
         rest += matrix * matrix * near * square
         size = matrix.nrows()
-        one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+        one = identity(size)
         short = AffineMatrix(one, slope, rest, self.half)
         if all(x.is_zero() for x in by.entries()):
             nothing = arb_mat(size, size)
@@ -265,8 +265,8 @@ class Ray:
             assert central.slopes is not None
             assert wide.slopes is not None
             slopes = wide.slopes.resets[reset]
-            leap = self._by_parameter(central.resets[reset], central.slopes.resets[reset], slopes)
-            start, rate, by_state = leap * before, leap * rate, flow * leap
+            mapped = self._by_parameter(central.resets[reset], central.slopes.resets[reset], slopes)
+            start, rate, by_state = mapped * before, mapped * rate, flow * mapped
             late_by = by * start + flow * (self._split(slopes) * before)
         end = flow * start
         speed = field * end

@@ -103,7 +103,7 @@ def _lasting(
     """Return mode and exit of the segments of an orbit that last, by number; and tests of these.
 
     Two of one mode, between which only vanished ones are, are one that touches the exit of the first. What
-    vanishes behind an impact without speed does not move on: the segment before it ends where that one does.
+    vanishes after an impact without speed does not move on: the segment before it ends where that one does.
     """
     count, resets, lasts = len(orbit.durations), orbit.system.layout.resets, orbit.durations
     found = {i: orbit.itinerary[i] for i in range(count) if lasts[i] > VANISHED}

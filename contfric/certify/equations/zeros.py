@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 
 from contfric.certify.equations.chain import Segments
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, numbers
+from contfric.models.balls.numbers import Vector, identity, numbers
 
 #: Most derivatives of an observable that vanish at a start: rest left at the largest load has three.
 MOST_ORDER = 4
@@ -77,7 +77,7 @@ def at_start(segments: Segments, model: BallModel, i: int, rows: list[Vector]) -
     """Return the rows that vanish where segment i starts: after its reset, if there is one."""
     if not segments.resets[i]:
         return rows
-    return _behind(rows, model, segments.resets[i], segments.modes[i])
+    return _after_reset(rows, model, segments.resets[i], segments.modes[i])
 
 
 def _at_end(
@@ -92,17 +92,17 @@ def _at_end(
     return [exit_row, *(row for row in kept if not in_span(row, [exit_row]))]
 
 
-def _behind(rows: list[Vector], model: BallModel, reset: str, mode: str) -> list[Vector]:
+def _after_reset(rows: list[Vector], model: BallModel, reset: str, mode: str) -> list[Vector]:
     """Return the surfaces on which the image of a reset lies, and the one of the reset if it is touched.
 
     An impact without speed leaves without speed: the rate along the mode after it vanishes, too.
     """
     matrix = model.resets[reset]
     found = [*model.rows.values(), model.rate(reset, mode)]
-    return [row for row in found if vanishes_behind(row, matrix, rows)]
+    return [row for row in found if vanishes_after(row, matrix, rows)]
 
 
-def vanishes_behind(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
+def vanishes_after(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
     """Tell whether a row vanishes after a reset, if others do before it.
 
     A row that a reset leaves as it is may have balls, as those of the level of a wall that is moved.
@@ -110,7 +110,7 @@ def vanishes_behind(row: Vector, reset: arb_mat, rows: list[Vector]) -> bool:
     if in_span(numbers(arb_mat([row]) * reset), rows):
         return True
     size = reset.nrows()
-    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    one = identity(size)
     return in_span(row, rows) and in_span(numbers(arb_mat([row]) * (reset - one)), rows)
 
 

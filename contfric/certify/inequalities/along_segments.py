@@ -23,7 +23,7 @@ from contfric.certify.equations.zeros import (
     at_start,
     in_span,
     order_at_start,
-    vanishes_behind,
+    vanishes_after,
     zeros_at_joints,
 )
 from contfric.certify.inequalities.sign import Path, positive, touched, undecided
@@ -183,11 +183,11 @@ def _before(segments: Segments, i: int, surface: str) -> InequalityName:
 
 
 def _enters_at_rest(chain: Chain, zeros: list[Vector], found: Inequality) -> bool:
-    """Tell whether a segment begins on a surface, as it does behind an impact without speed."""
+    """Tell whether a segment begins on a surface, as it does after an impact without speed."""
     if found.what != ENTRY:
         return False
     reset = chain.model.resets[chain.segments.resets[found.segment]]
-    return vanishes_behind(chain.model.rows[found.surface], reset, zeros)
+    return vanishes_after(chain.model.rows[found.surface], reset, zeros)
 
 
 def _is_event(touch: Touch | None, i: int, surface: str) -> bool:

@@ -20,7 +20,7 @@ and q' < 0. Which derivatives vanish is not a question of rounding: it is read o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -64,6 +64,12 @@ class Path:
     start: arb_mat
     duration: arb
     shortest: arb | None = None
+    # what was computed, by level and index of a piece, or by level
+    _states: dict[tuple[int, int], arb_mat] = field(default_factory=dict)
+    _sizes: dict[tuple[int, int], arb] = field(default_factory=dict)
+    _flows: dict[tuple[int, int], arb_mat] = field(default_factory=dict)
+    _growths: dict[int, arb] = field(default_factory=dict)
+    _shifts: dict[int, arb_mat] = field(default_factory=dict)
 
     def lasts(self, level: int, index: int) -> bool:
         """Tell whether all of the solutions last up to the middle of piece ``index`` of 2^level."""
@@ -88,26 +94,6 @@ class Path:
             for i in range(size)
         ]
         return max((total.upper() for total in sums), key=float)
-
-    @cached_property
-    def _states(self) -> dict[tuple[int, int], arb_mat]:
-        return {}
-
-    @cached_property
-    def _growths(self) -> dict[int, arb]:
-        return {}
-
-    @cached_property
-    def _sizes(self) -> dict[tuple[int, int], arb]:
-        return {}
-
-    @cached_property
-    def _flows(self) -> dict[tuple[int, int], arb_mat]:
-        return {}
-
-    @cached_property
-    def _shifts(self) -> dict[int, arb_mat]:
-        return {}
 
     def middle(self, level: int, index: int) -> arb_mat:
         """Return the extended state at the middle of piece ``index`` of 2^level."""

@@ -16,7 +16,7 @@ from flint import arb, arb_mat
 from contfric.certify.enclosures.affine import AffineMatrix
 from contfric.errors import ContfricError
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import column, numbers
+from contfric.models.balls.numbers import column, identity, numbers
 
 HALF = arb(0, 1)  # all s
 #: Newton steps towards an exit, and how often the width of its time is widened.
@@ -121,7 +121,7 @@ def _moved(field: arb_mat, there: AffineMatrix, slope: arb, extra: arb) -> Affin
     """Return the state after a further time ``s slope + extra``."""
     delta = slope * HALF + extra
     size = field.nrows()
-    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    one = identity(size)
     linear = (field * slope).mid()
     rest = (field * slope - linear) * HALF + field * extra
     square = arb(0, (delta * delta / 2).abs_upper())

@@ -41,13 +41,12 @@ from contfric.certify.inequalities.along_segments import (
     inequalities,
 )
 from contfric.certify.tubes.circle import is_off
-from contfric.certify.tubes.passing import dot
 from contfric.certify.tubes.piece import UNKNOWN, Piece
 from contfric.certify.tubes.splitting import Split, event_of, has_no_flip, split_box
 from contfric.certify.tubes.tube import Box, box_between, orbit_in, section, solved
 from contfric.certify.tubes.turns import Turns
 from contfric.certify.verdict import Verdict, all_of
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, dot
 
 if TYPE_CHECKING:
     from contfric.certify.tubes.tracing import Arcs, Tracer

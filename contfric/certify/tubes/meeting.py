@@ -26,7 +26,7 @@ from contfric.certify.events import EventCertificate
 from contfric.certify.inequalities.along_segments import rows_met
 from contfric.models.balls.build import ball_model
 from contfric.models.balls.model import BallModel
-from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, identity, numbers
 
 #: A joint of the branch is taken for that of the event within this distance.
 _NEAR = 1e-5
@@ -140,7 +140,7 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     segments = segments_of(orbit.system)
     m, half = segments.states + 1, orbit.system.half
     closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
-    one = arb_mat([[arb(int(a == b)) for b in range(m - 1)] for a in range(m - 1)])
+    one = identity(m - 1)
     twice = closure * closure == one  # for certain
     if not twice:
         return None
@@ -339,6 +339,6 @@ def _act_alike(model: BallModel, resets: tuple[str, str], vanishing: list[Vector
     """Tell whether two resets (or none) lead to the same state, as an impact without speed leads nowhere."""
     if resets[0] == resets[1]:
         return True
-    one = arb_mat([[int(a == b) for b in range(model.size)] for a in range(model.size)])
+    one = identity(model.size)
     first, second = (model.resets[name] if name else one for name in resets)
     return all(in_span(row, vanishing) for row in (first - second).tolist())

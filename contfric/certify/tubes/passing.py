@@ -24,7 +24,7 @@ from contfric.certify.enclosures.bounds import Bounds
 from contfric.certify.equations.chain import Chain, Segments
 from contfric.certify.equations.extended import Builder
 from contfric.certify.tubes.tube import OVERLAP, Box, squared
-from contfric.models.balls.numbers import Vector
+from contfric.models.balls.numbers import Vector, dot
 
 
 def passes_once(segments: Segments, build: Builder, box: Box, sigma: int) -> bool:
@@ -66,8 +66,3 @@ def bordered(matrices: list[arb_mat], b: Vector, c: Vector) -> list[arb_mat]:
         arb_mat([*([*row, x] for row, x in zip(m.tolist(), right, strict=True)), [*below, arb(0)]])
         for m, (right, below) in zip(matrices, edges, strict=True)
     ]
-
-
-def dot(a: Vector, b: Vector) -> arb:
-    """Return the scalar product."""
-    return sum((x * y for x, y in zip(a, b, strict=True)), arb(0))

@@ -39,9 +39,9 @@ from contfric.certify.enclosures.bounds import regular_along, supersolution, upp
 from contfric.certify.enclosures.krawczyk import approximate_inverse, enclosed
 from contfric.certify.equations.chain import Chain, Segments
 from contfric.certify.equations.extended import Builder, with_multiplier
-from contfric.certify.tubes.passing import dot, null_vectors
+from contfric.certify.tubes.passing import null_vectors
 from contfric.certify.verdict import Verdict
-from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, dot, identity, numbers
 
 #: Least half-widths, relative to 1 + the size of each number: rounding of 80 bits.
 _LEAST = 2.0**-60
@@ -213,7 +213,7 @@ class _Ways:
     def gap(self, inverse: arb_mat, c: Vector) -> FloatArray:
         """Return bounds of ``1 - C G_x`` for all e."""
         size, width = self.size, 2 * self.size + 1
-        one = arb_mat([[int(a == b) for b in range(width)] for a in range(width)])
+        one = identity(width)
         bent: arb_mat | None = None
         found = np.zeros((width, width))
         for e in self.parts:

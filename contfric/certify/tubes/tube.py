@@ -33,7 +33,7 @@ from contfric.certify.equations.chain import Chain, Segments
 from contfric.certify.equations.extended import Builder
 from contfric.certify.equations.ray import Chord, Linear, Ray
 from contfric.certify.verdict import Verdict
-from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, dot, numbers
 
 #: How far a box reaches beyond its two orbits, as a share of it: boxes of a tube overlap.
 OVERLAP = 0.02
@@ -94,7 +94,7 @@ class Box:
         difference = [(b - a).mid() for a, b in zip(self.first, self.last, strict=True)]
         middle = [((a + b) / 2).mid() for a, b in zip(self.first, self.last, strict=True)]
         off = [p - m for p, m in zip(point, middle, strict=True)]
-        s = sum((n * c for n, c in zip(self.normal, off, strict=True)), arb(0))
+        s = dot(self.normal, off)
         if not abs(s) < 0.5 + OVERLAP:
             return False
         return all(abs(o - s * c) < r for o, c, r in zip(off, difference, self.radii, strict=True))

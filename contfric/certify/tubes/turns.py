@@ -12,7 +12,7 @@ from contfric.certify.equations.chain import Segments, segments_of
 from contfric.certify.events import EventCertificate
 from contfric.events.bifurcation import Kind
 from contfric.models.balls.build import ball_model
-from contfric.models.balls.numbers import Vector, column, numbers
+from contfric.models.balls.numbers import Vector, column, dot, identity, numbers
 from contfric.orbit.orbit import Orbit
 
 #: A joint of the branch is taken for that of the event within this distance.
@@ -72,7 +72,7 @@ class Turns:
         scale = arb(1) if self.later is None else 2 * arb.pi() / model.period
         scaled = [x * scale if k % m == 0 else x for k, x in enumerate(proof.zero[:-1])]
         u, phi = scaled[:size], scaled[size:]
-        factor = sum((c * x for c, x in zip(functional, phi, strict=True)), arb(0))
+        factor = dot(functional, phi)
         found = [*u, *(x / factor for x in phi), proof.zero[-1]]
         return all(ball.contains(x) for ball, x in zip(box, found, strict=True))
 
@@ -130,9 +130,7 @@ def turns_of(proof: EventCertificate, system: System, near: Vector) -> Turns | N
         return None
     segments = segments_of(orbit.system)
     closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
-    one = arb_mat(
-        [[arb(int(a == b)) for b in range(segments.states)] for a in range(segments.states)]
-    )
+    one = identity(segments.states)
     autonomous = orbit.model.autonomous
     scale = arb(1) if autonomous else 2 * arb.pi() / orbit.flow.period
     places = _turned(pair, system, near) if autonomous else _places(pair, system, near, scale)

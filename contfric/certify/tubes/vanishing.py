@@ -50,7 +50,7 @@ from contfric.certify.tubes.meeting import as_zero_of
 from contfric.certify.tubes.piece import UNKNOWN, Piece
 from contfric.certify.tubes.tube import orbit_in
 from contfric.certify.verdict import Finding, Verdict, all_of
-from contfric.models.balls.numbers import Vector, around, column, numbers
+from contfric.models.balls.numbers import Vector, around, column, identity, numbers
 
 if TYPE_CHECKING:
     from contfric.certify.tubes.tracing import Tracer
@@ -199,7 +199,7 @@ def box_up_to(
     if inverse is None:
         return None
     size = len(middle)
-    one = arb_mat([[int(a == b) for b in range(size)] for a in range(size)])
+    one = identity(size)
     moved = upper(inverse * column(residual))[:, 0]
     least = np.array([_LEAST * float(1 + x.abs_upper()) for x in middle])
     radii = _MORE * moved + least

@@ -30,14 +30,12 @@ from contfric.curves.of_quantities.curve import QuantityCurve
 from contfric.curves.of_quantities.step import Defects, Held
 from contfric.curves.of_quantities.trace import both_sides, check_orbit
 from contfric.curves.ranges import Ranges, ranges_of
-from contfric.curves.trace import Progress, largest_step
+from contfric.curves.trace import Progress, checked_options, largest_step
 from contfric.errors import (
     ConvergenceError,
     ParameterError,
-    function_of,
     items_of,
     shown,
-    whole_number,
 )
 from contfric.orbit.canonical.sections import canonical
 from contfric.orbit.gradient import by_parameters
@@ -219,9 +217,7 @@ def continue_extremum(
             f"got {shown(parameters)}"
         )
     box = ranges_of(orbit.model, names, ranges)
-    largest = largest_step(max_step, orbit.model)
-    whole_number("max_points", max_points, least=2)
-    function_of("progress", progress)
+    largest = checked_options(orbit.model, max_step, max_points, progress)
     held, first = _start(orbit, measured, box, progress)
     found = both_sides(held, first, largest, max_points, progress)
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(found)}

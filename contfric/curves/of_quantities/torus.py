@@ -19,7 +19,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
 from contfric.continuation.points import MOST_POINTS, Point
@@ -40,20 +39,19 @@ _MULTIPLIER = 1e-6
 _RESONANCES = {CodimTwo.R3: 2.0 * math.pi / 3.0, CodimTwo.R4: math.pi / 2.0}
 
 
-def critical_pair(mu: NDArray[np.complex128]) -> tuple[int, int]:
-    """Return the two multipliers whose product is a real number nearest to 1.
+def critical_pair(orbit: Orbit) -> tuple[complex, complex]:
+    """Return the two multipliers of a turn whose product is a real number nearest to 1.
 
     Two conjugate ones, or two real ones of the same sign.
     """
 
-    def distance(pair: tuple[int, int]) -> float:
-        product = complex(mu[pair[0]] * mu[pair[1]])
+    def distance(pair: tuple[complex, complex]) -> float:
+        product = pair[0] * pair[1]
         if abs(product.imag) > 1e-9 * abs(product) or product.real <= 0.0:
             return math.inf  # of two pairs, or of a real one and one of a pair: not conjugate
         return abs(math.log(product.real))
 
-    pairs = list(itertools.combinations(range(len(mu)), 2))
-    return min(pairs, key=distance)
+    return min(itertools.combinations(orbit.turn_multipliers.tolist(), 2), key=distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,30 +72,25 @@ class OnCircle(Held):
 
     def defect(self, orbit: Orbit) -> float:
         """Return log(mu_1 mu_2) of the critical pair."""
-        mu = orbit.turn_multipliers
-        one, other = critical_pair(mu)
-        return math.log(abs(mu[one] * mu[other]))
+        one, other = critical_pair(orbit)
+        return math.log(abs(one * other))
 
     def bound(self, point: Point) -> float:
         """Return the discriminant of the pair, 1 - (trace / 2)^2 / determinant: positive if complex."""
-        mu = self.orbit_of(point).turn_multipliers
-        one, other = critical_pair(mu)
-        total, product = mu[one] + mu[other], mu[one] * mu[other]
-        return 1.0 - float((total * total / (4.0 * product)).real)
+        one, other = critical_pair(self.orbit_of(point))
+        return 1.0 - ((one + other) ** 2 / (4.0 * one * other)).real
 
     def end_at_bound(self, point: Point) -> CurveEnd:
         """Return the end where the pair is real."""
         orbit = self.orbit_of(point)
-        mu = orbit.turn_multipliers
-        kind = CodimTwo.R1 if float(mu[critical_pair(mu)[0]].real) > 0.0 else CodimTwo.R2
+        kind = CodimTwo.R1 if critical_pair(orbit)[0].real > 0.0 else CodimTwo.R2
         special = SpecialPoint(kind, kind.name, orbit.params, orbit)
         return CurveEnd(CurveEndReason.MEETS, f"{kind.value}: a neutral saddle follows", special)
 
 
 def angle_of(orbit: Orbit) -> float:
     """Return the angle of the critical pair, in [0, pi]."""
-    mu = orbit.turn_multipliers
-    return abs(float(np.angle(mu[critical_pair(mu)[0]])))
+    return abs(float(np.angle(critical_pair(orbit)[0])))
 
 
 def continue_torus(

@@ -20,13 +20,11 @@ from contfric.curves.of_quantities.step import Held
 from contfric.curves.points import end_of_march, march_on, returned
 from contfric.curves.ranges import PlaneRanges, Ranges, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
-from contfric.curves.trace import Progress, largest_step
+from contfric.curves.trace import Progress, checked_options
 from contfric.errors import (
     ConvergenceError,
     ParameterError,
-    function_of,
     real_number,
-    whole_number,
 )
 from contfric.events.bifurcation import EndReason
 from contfric.events.sliding_kinds import kind_of_margin
@@ -105,9 +103,7 @@ def continue_quantity(
     held_quantity = number_quantity(quantity, orbit.model, "a curve")
     value = real_number("value", value)
     box = box_of(orbit.model, parameters, ranges)
-    largest = largest_step(max_step, orbit.model)
-    whole_number("max_points", max_points, least=2)
-    function_of("progress", progress)
+    largest = checked_options(orbit.model, max_step, max_points, progress)
     start = _start(orbit, held_quantity, value, box, progress)
     held = Held(start, held_quantity, value, box)
     first = None if held.still() else held.first()

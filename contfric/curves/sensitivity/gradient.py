@@ -71,8 +71,8 @@ def plane_of(bifurcation: Bifurcation, one: str, other: str) -> Problem:
 def slope_of(bifurcation: Bifurcation, one: str, other: str) -> float:
     """Return the derivative of a parameter of an event by another one; infinite where that stands still."""
     orbit, problem = bifurcation.orbit, plane_of(bifurcation, one, other)
-    joints = orbit.joints if orbit.system is problem.system else orbit.as_half().joints
-    found = first_curve_point(problem, problem.orbit(joints, orbit.vector[problem.which]))
+    here = problem.orbit(problem.joints_of(orbit), orbit.vector[problem.which])
+    found = first_curve_point(problem, here)
     if found is None:
         raise ConvergenceError(
             f"{bifurcation!r} has no curve with a unique direction in {problem.box.names}", orbit

@@ -76,9 +76,7 @@ def _solved(event: Bifurcation, name: str, target: FloatArray) -> Bifurcation | 
     problem = replace(
         problem, box=replace(known.box, low=at - known.box.widths, high=at + known.box.widths)
     )
-    joints = event.orbit.joints
-    if event.orbit.system is not problem.system:
-        joints = event.orbit.as_half().joints
+    joints = problem.joints_of(event.orbit)
     border = border_of(problem, joints, target)
     fixed = problem.box.widths * np.array([0.0, 1.0])
     point = solve_point(problem, joints, at, np.zeros_like(joints), fixed, border)

@@ -68,6 +68,16 @@ def numbers(matrix: arb_mat) -> Vector:
     return list(matrix.entries())
 
 
+def identity(size: int) -> arb_mat:
+    """Return the identity matrix."""
+    return arb_mat(size, size, 1)
+
+
+def dot(a: Sequence[arb], b: Sequence[arb]) -> arb:
+    """Return the scalar product."""
+    return sum((x * y for x, y in zip(a, b, strict=True)), arb(0))
+
+
 def around(centre: arb, radius: arb) -> arb:
     """Return a ball that contains all numbers within a radius of a centre (itself a ball, or exact)."""
     return centre + arb(0, radius.abs_upper())

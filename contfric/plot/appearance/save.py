@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from os import PathLike
@@ -19,6 +19,8 @@ from PIL import Image
 
 from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
+from contfric.models import Model
+from contfric.plot.appearance.names import full_title, told
 from contfric.plot.appearance.style import SMALL, TEXT, sized
 
 if TYPE_CHECKING:
@@ -214,6 +216,12 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
         from matplotlib import pyplot
 
     return pyplot.figure(figsize=_size(width, height), layout="constrained")
+
+
+def title_axes(ax: Axes, model: Model, fixed: Mapping[str, float], title: str = "") -> None:
+    """Write a title, and below it the parameters that have one value all over the axes."""
+    text = full_title(title, model.parameter_names, told(fixed, model.defaults))
+    ax.set_title(text, fontsize=sized(TEXT))
 
 
 def name_axes(ax: Axes, across: str | None, up: str) -> None:

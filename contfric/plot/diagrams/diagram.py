@@ -285,10 +285,7 @@ def draw_row(
     for branch in sorted(branches, key=lambda b: not b.mirrored):
         if branch.mirrored and branch.name in twins:
             continue  # it lies on its original
-        if branch.bridge:
-            _draw_bridge(ax, branch, row, look)
-        else:
-            _draw_branch(ax, branch, row, look)
+        _draw_branch(ax, branch, row, look)
     draw_marks(ax, marks)
     ax.margins(y=_MARGIN)
     if row == "multiplier":
@@ -336,33 +333,22 @@ def _cut_resonances(ax: Axes, branches: Sequence[Branch], marks: Sequence[Mark])
 
 
 def _draw_branch(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
-    width = MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
-    colour = look.colours[branch.name]
-    colour = lighter(colour) if branch.mirrored else colour
+    colour = BRIDGE_COLOUR if branch.bridge else look.colours[branch.name]
+    if branch.mirrored:
+        colour = lighter(colour, 0.3) if branch.bridge else lighter(colour)
     for run in stability_runs(branch, row):
-        known = run.stable is not None
-        lines = ax.plot(
+        style = {True: "stable", False: "unstable", None: "unknown"}[run.stable]
+        style = "bridge" if branch.bridge else style
+        width = {"bridge": BRIDGE_WIDTH, "unknown": UNKNOWN_WIDTH}.get(
+            style, MIRROR_WIDTH if branch.mirrored else LINE_WIDTH
+        )
+        level = 1.6 if branch.bridge else 2.0 + 0.5 * bool(run.stable)
+        (line,) = ax.plot(
             *run.line,
-            color=colour if known else greyish(colour),
-            linestyle=look.styles[
-                "unknown" if not known else "stable" if run.stable else "unstable"
-            ],
-            linewidth=sized(width if known else UNKNOWN_WIDTH),
+            color=greyish(colour) if style == "unknown" else colour,
+            linestyle=look.styles[style],
+            linewidth=sized(width),
             solid_capstyle="butt",
-            zorder=2.0 + 0.5 * bool(run.stable) - 0.3 * branch.mirrored,
+            zorder=level - (0.1 if branch.bridge else 0.3) * branch.mirrored,
         )
-        for line in lines:
-            line.set_gid(branch.name)
-
-
-def _draw_bridge(ax: Axes, branch: Branch, row: QuantityLike, look: Look) -> None:
-    for run in stability_runs(branch, row):
-        lines = ax.plot(
-            *run.line,
-            color=lighter(BRIDGE_COLOUR, 0.3) if branch.mirrored else BRIDGE_COLOUR,
-            linestyle=look.styles["bridge"],
-            linewidth=sized(BRIDGE_WIDTH),
-            zorder=1.6 - 0.1 * branch.mirrored,
-        )
-        for line in lines:
-            line.set_gid(branch.name)
+        line.set_gid(branch.name)

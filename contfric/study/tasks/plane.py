@@ -113,18 +113,16 @@ class PlaneTask(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Draw the curves, over a map of Lyapunov exponents of the same plane."""
-        from contfric.plot.appearance.names import full_title, told
-        from contfric.plot.appearance.style import TEXT, sized
+        from contfric.plot.appearance.save import title_axes
         from contfric.plot.lyapunov import plot_lyapunov_map
         from contfric.plot.plane import plot_plane
 
         plane, lmap, axes = found["plane"], found.get("lyapunov"), figure.add_subplot()
         if lmap is not None and tuple(lmap.axes) == plane.parameters:
             plot_lyapunov_map(lmap, ax=axes)
-        names, varied = plane.model.parameter_names, plane.parameters
-        fixed = {n: v for n, v in plane.model.mapping(plane.vector).items() if n not in varied}
-        text = full_title(title, names, told(fixed, plane.model.defaults))
-        axes.set_title(text, fontsize=sized(TEXT))
+        named = plane.model.mapping(plane.vector)
+        fixed = {name: v for name, v in named.items() if name not in plane.parameters}
+        title_axes(axes, plane.model, fixed, title)
         plot_plane(plane, ax=axes, legend_below=True)
 
     def entry(self, found: Plane) -> dict[str, Any]:

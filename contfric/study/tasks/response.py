@@ -36,16 +36,12 @@ class Response(Task):
 
     def draw(self, figure: Figure, drawing: Drawing, found: Found, title: str) -> None:
         """Let the result draw itself, with the parameters that it keeps in the title."""
-        from contfric.plot.appearance.names import full_title, told
-        from contfric.plot.appearance.style import TEXT, sized
+        from contfric.plot.appearance.save import title_axes
 
         response, axes = found[self.result], figure.add_subplot()
         if self.under in found:
             found[self.under].plot(ax=axes)
-        model = response.model
-        fixed = told(self.fixed(response), model.defaults)
-        text = full_title(title, model.parameter_names, fixed)
-        response.plot(ax=axes).set_title(text, fontsize=sized(TEXT))
+        title_axes(response.plot(ax=axes), response.model, self.fixed(response), title)
 
     def fixed(self, found: Any) -> dict[str, float]:
         """Return the parameters that have one value all over the figure."""
