@@ -53,7 +53,7 @@ def last_told(step: Step) -> Point | None:
     """
     beyond = step.beyond
     here = step.orbit_at(beyond)
-    if beyond is not step.after and bool(np.min(here.durations) < NO_LENGTH):
+    if beyond is not step.after and bool(here.durations.min() < NO_LENGTH):
         told = _told_before(step)
         if told is not None:
             return told
@@ -70,7 +70,7 @@ def first_told(step: Step) -> Point:
     At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
     """
     before = step.before
-    at_event = np.min(before.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION
+    at_event = before.tests[:-EXTRA].min(initial=np.inf) < _LOCATED * SAME_LOCATION
     pole = at_event and np.abs(before.mu).max(initial=0.0) > 1.0 / _LOCATED
     if not pole or step.length <= 2.0 * SAME_LOCATION:
         return before
