@@ -1,4 +1,4 @@
-"""Along a branch the turn changes with the parameter: segments last what is left of each point's own turn."""
+"""Along a branch the turn changes with the parameter: segments add up to the turn of their own point."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.continuation.locating.vanishing_together import _lasts
+from contfric.continuation.locating.vanishing_together import _lasts, _rates
 from contfric.continuation.points import settings_of
 from contfric.continuation.start import start_of
 from contfric.continuation.trace import trace_side
@@ -29,3 +29,7 @@ def test_segments_add_up_to_the_turn_of_their_own_point(
         turn = (np.pi if half else 2.0 * np.pi) / value
         assert lasts.sum() == pytest.approx(turn, rel=1e-13)
         assert lasts.min() > -1e-9
+        point, step = side.rows.point(k), 1e-5
+        ahead, behind = (point.along(orbit, active, s).durations for s in (step, -step))
+        change = (ahead - behind)[: len(lasts)] / (2.0 * step)
+        assert _rates(point, orbit, active) == pytest.approx(change, abs=1e-8 * (1.0 + turn))

@@ -31,6 +31,7 @@ from contfric.base.arrays import FloatArray
 from contfric.bvp.system import Margin
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
+from contfric.events.local.gradients import closing
 from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.orbit import Orbit
 
@@ -115,7 +116,7 @@ def nearer_than_twins(
         return None
     tip, share = before, _STEP
     for _ in range(_MOST):
-        lasts, rates = _lasts(tip, orbit, active)[twins], _rates(tip)[twins]
+        lasts, rates = _lasts(tip, orbit, active)[twins], _rates(tip, orbit, active)[twins]
         if not np.all(rates < 0.0) or float(np.max(lasts)) < _REACHED * time_unit(orbit):
             break
         step = share * float(np.min(lasts / -rates))
@@ -133,9 +134,10 @@ def _lasts(point: Point, orbit: Orbit, active: int) -> FloatArray:
     return point.orbit(orbit, active).durations[: orbit.system.segments]
 
 
-def _rates(point: Point) -> FloatArray:
-    """Return how the lengths change along the branch; that of the last segment as the period does not."""
-    rates: FloatArray = np.diff(point.tangent[:, 0], append=point.tangent[0, 0])
+def _rates(point: Point, orbit: Orbit, active: int) -> FloatArray:
+    """Return how the lengths change along the branch."""
+    turn = float(closing(point.orbit(orbit, active), active)[0]) * point.slope
+    rates: FloatArray = np.diff(point.tangent[:, 0], append=point.tangent[0, 0] + turn)
     return rates
 
 
