@@ -126,7 +126,6 @@ class Side:
     _fresh: int = 0
     autonomous: bool = False
     solves: int = 0
-    _pace: Pace = field(default_factory=Pace)
     notes: list[str] = field(default_factory=list)
 
     @classmethod
@@ -218,17 +217,17 @@ class Side:
         options = march_options(step, largest, ON_THE_WAY if integrated else ALONG)
         why, most = MORE, _MOST_SOLVES * settings.most_points
         problem, start, counts = branch_problem(orbit, settings), self.first.as_start(), tally()
-        box, arrays = settings.box, self.rows.arrays(stop)
+        box, arrays, pace = settings.box, self.rows.arrays(stop), _LAST.pace
         while why == MORE and self.solves < most:  # between the calls Ctrl-C is heard
             heed()
-            options[BUDGET], before, began = self._pace.budget, int(counts[0]), perf_counter()
+            options[BUDGET], before, began = pace.budget, int(counts[0]), perf_counter()
             course = Course(options, box, self.last, *start, self.count - 1, arrays, counts)
             why, last, options[0] = march(problem, course)
             self.count += last - self.last
             self.last = last
             done = int(counts[0]) - before
             self.solves += done
-            self._pace.took(done, perf_counter() - began)
+            pace.took(done, perf_counter() - began)
         return why, float(options[0])
 
     def _keep_full_rows(self) -> None:
@@ -264,8 +263,10 @@ class _LastProblem(threading.local):
     """The branch last at work in this thread: its pieces and its events ask for it again and again."""
 
     orbit: Orbit | None = None
+    system: System | None = None
     settings: Settings | None = None
     problem: BranchProblem
+    pace: Pace
 
 
 _LAST = _LastProblem()
@@ -275,14 +276,25 @@ def branch_problem(orbit: Orbit, settings: Settings) -> BranchProblem:
     """Return the branch of an orbit as the compiled engine takes it."""
     from contfric.continuation.core.steps import BranchProblem
 
-    if _LAST.orbit is not orbit or _LAST.settings is not settings:
-        system, which = orbit.system, np.array([orbit.model.index_of(settings.parameter)])
-        scale, functions = np.array([settings.scale]), system.functions()
-        _LAST.problem = BranchProblem(
-            functions, system.layout, orbit.vector, which, scale, settings.stability
-        )
-        _LAST.orbit, _LAST.settings = orbit, settings
+    if _LAST.orbit is orbit and _LAST.settings is settings:
+        return _LAST.problem
+    system = orbit.system
+    if _LAST.system is not system:
+        _LAST.pace = Pace()
+    if _LAST.system is system and _LAST.settings is settings:  # an orbit next to the last one
+        which, scale = _LAST.problem.which, _LAST.problem.scale
+    else:
+        which = np.array([orbit.model.index_of(settings.parameter)])
+        scale = np.array([settings.scale])
+    _LAST.problem = BranchProblem(
+        system.functions(), system.layout, orbit.vector, which, scale, settings.stability
+    )
+    _LAST.orbit, _LAST.system, _LAST.settings = orbit, system, settings
     return _LAST.problem
+
+
+#: Where a march began, for one that is a single point: it returns nowhere.
+_NO_START = np.empty((0, 0, 0)), np.empty((0, 0))
 
 
 def first_point(
@@ -302,8 +314,8 @@ def first_point(
     rows = PointRows.empty(orbit.system, 1)
     rows.joints[0], rows.w[0] = orbit.joints, orbit.vector[orbit.model.index_of(settings.parameter)]
     rows.tangents[0], rows.directions[0] = direction, slope
-    options, start = march_options(0.0, settings.largest, ALONG), rows.only().as_start()
-    course = Course(options, settings.box, -1, *start, 0, rows.arrays(), tally())
+    options = march_options(0.0, settings.largest, ALONG)
+    course = Course(options, settings.box, -1, *_NO_START, 0, rows.arrays(), tally())
     why, _, _ = march(branch_problem(orbit, settings), course)
     return None if why == BROKEN else rows.only()
 

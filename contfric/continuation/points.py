@@ -219,7 +219,8 @@ class PointRows:
         """Return the arrays up to a row, as the march takes them."""
         from contfric.continuation.core.geometry import Points
 
-        return Points(*[array[:stop] for array in vars(self).values()])
+        arrays = vars(self).values()
+        return Points(*(arrays if stop is None else [array[:stop] for array in arrays]))
 
     def first(self, count: int) -> PointRows:
         """Return the first rows."""

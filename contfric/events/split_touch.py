@@ -49,8 +49,11 @@ def as_split(found: Bifurcation, tangent: FloatArray) -> Bifurcation | None:
     tangent : direction of the curve of orbits at the fold, shape (segments, 1 + n)
     """
     system = found.orbit.system
+    touches = touch_holds(system)
+    if not touches:
+        return None
     moved = np.abs(tangent).max(axis=1)
-    pins = [k for k in touch_holds(system) if moved[k] > _ALONE * moved.max()]
+    pins = [k for k in touches if moved[k] > _ALONE * moved.max()]
     rest = np.delete(moved, pins)
     if not pins or np.max(rest, initial=0.0) > _ALONE * moved[pins].max():
         return None

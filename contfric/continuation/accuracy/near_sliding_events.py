@@ -53,7 +53,7 @@ def last_told(step: Step) -> Point | None:
     """
     beyond = step.beyond
     here = step.orbit_at(beyond)
-    if beyond is not step.after and bool(np.min(here.durations) < NO_LENGTH):
+    if beyond is not step.after and bool(here.durations.min() < NO_LENGTH):
         told = _told_before(step)
         if told is not None:
             return told
@@ -78,7 +78,7 @@ def first_told(step: Step) -> Point:
 
 def at_event(point: Point) -> bool:
     """Tell whether a point is a located sliding event."""
-    return bool(np.min(point.tests[:-EXTRA], initial=np.inf) < _LOCATED * SAME_LOCATION)
+    return bool(point.tests[:-EXTRA].min(initial=np.inf) < _LOCATED * SAME_LOCATION)
 
 
 def _if_finite(point: Point | None) -> Point | None:

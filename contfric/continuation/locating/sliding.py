@@ -61,7 +61,7 @@ def sliding_events(
     first, point = located
     while hidden := _located_before(orbit, before, point, settings):
         first, point = min(hidden, key=lambda pair: pair[1].arc)
-    left = _left_by_jump(before, point, first, orbit.turn)
+    left = _left_by_jump(orbit, before, point, settings, first)
     tip = nearer_than_twins(orbit, before, point, settings)
     if tip is not None and (found := nearly_reached(orbit, tip, settings)) is not None:
         return [(found, tip)]
@@ -101,17 +101,19 @@ def sliding_events(
     return [(replace(found, bound=max(found.accuracy, known)) if known > 0.0 else found, point)]
 
 
-def _left_by_jump(before: Point, point: Point, first: int, turn: float) -> float:
+def _left_by_jump(
+    orbit: Orbit, before: Point, point: Point, settings: Settings, first: int
+) -> float:
     """Return what is left of a margin where it changes its sign; 0 where it vanishes.
 
     It jumps where the last trials went over to another curve: what was located lies before the event. Where a
     slide is as short as it is known to (its cube root of rounding) every step may go to another curve.
     """
-    left, times = float(point.tests[first]), before.joints[:, 0]
+    left = float(point.tests[first])
     if point.lost or left <= max(_REACHED, _JUMPS * float(before.tests[first])):
         return 0.0
-    lasts = float(np.diff(times, append=times[0] + turn).min())
-    return left if lasts > _KNOWN * turn else 0.0
+    here = before.orbit(orbit, orbit.model.index_of(settings.parameter))
+    return left if float(here.durations.min()) > _KNOWN * here.turn else 0.0
 
 
 def _first_located(

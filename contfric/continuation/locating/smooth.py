@@ -113,7 +113,16 @@ def smooth_events(step: Step) -> list[Located]:
             found.append(_overshot(step, kind))
             if found[-1][1].lost:
                 return found  # the step is taken back: what else is in it is found again
-    return [*found, *tangencies(altered(step, after=step.beyond))]
+    step = altered(step, after=step.beyond)
+    return [*found, *tangencies(_up_to_end(step) if slides else step)]
+
+
+def _up_to_end(step: Step) -> Step:
+    """Return a step without what is next to the sliding event at its end: labels there belong to it."""
+    if step.length <= 2.0 * SAME_TANGENCY or (step.before.labels == step.after.labels).all():
+        return step
+    near = point_at(step, SAME_TANGENCY)
+    return step if near is None else altered(step, after=near)
 
 
 def _is_sliding(step: Step, fold: Bifurcation) -> bool:
@@ -221,6 +230,9 @@ def tangencies(step: Step) -> list[Located]:
     At an event at which a segment comes in, of no length, it is rounding what it and those next to it cross.
     """
     found: list[Located] = []
+    same = bool((step.before.labels == step.after.labels).all())
+    if same and not (at_event(step.before) or at_event(step.after)):
+        return found
     for k in (step.before.labels != step.after.labels).nonzero()[0].tolist():
         found += _changes(step, k)
     found += _undone(step, found)
@@ -320,7 +332,7 @@ def _vanishes(step: Step, k: int) -> bool:
     i, n = int(system.layout.labels[k][0]), system.segments
     near = [(i + step) % n for step in (-1, 0, 1)]
     motions = map(step.orbit_at, (step.before, step.after))
-    return any(np.any(m.durations[near] < NO_LENGTH) for m in motions)
+    return any((m.durations[near] < NO_LENGTH).any() for m in motions)
 
 
 def _meets(orbit: Orbit, k: int, here: Orbit) -> bool:

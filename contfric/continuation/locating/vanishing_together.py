@@ -28,9 +28,10 @@ from dataclasses import replace
 import numpy as np
 
 from contfric.base.arrays import FloatArray
-from contfric.bvp.system import Margin, System
+from contfric.bvp.system import Margin
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point, Settings
+from contfric.events.local.gradients import closing
 from contfric.orbit.canonical.slides import SHORT, time_unit
 from contfric.orbit.orbit import Orbit
 
@@ -106,38 +107,37 @@ def nearer_than_twins(
     ----------
     before, point : a point of the branch, and what was located after it
     """
-    now, most = _lasts(orbit.system, point, orbit), SHORT * time_unit(orbit)
+    active = orbit.model.index_of(settings.parameter)
+    now, most = _lasts(point, orbit, active), SHORT * time_unit(orbit)
     if orbit.model.autonomous or not now.min() < most:
         return None
-    twins = _lost_twins(_lasts(orbit.system, before, orbit), now)
+    twins = _lost_twins(_lasts(before, orbit, active), now)
     if not twins:
         return None
-    tip, active = before, orbit.model.index_of(settings.parameter)
-    share = _STEP
+    tip, share = before, _STEP
     for _ in range(_MOST):
-        lasts, rates = _lasts(orbit.system, tip, orbit)[twins], _rates(tip)[twins]
+        lasts, rates = _lasts(tip, orbit, active)[twins], _rates(tip, orbit, active)[twins]
         if not np.all(rates < 0.0) or float(np.max(lasts)) < _REACHED * time_unit(orbit):
             break
         step = share * float(np.min(lasts / -rates))
         moved = tip.along(orbit, active, step)
         there = first_point(moved, settings, tip.tangent, tip.slope)
-        if there is None or not _stays(orbit, there, twins, float(np.max(lasts))):
+        if there is None or not _stays(orbit, there, twins, active, float(np.max(lasts))):
             share *= 0.5
             continue
         tip = replace(there, arc=tip.arc + step)
     return None if tip is before else tip
 
 
-def _lasts(system: System, point: Point, orbit: Orbit) -> FloatArray:
+def _lasts(point: Point, orbit: Orbit, active: int) -> FloatArray:
     """Return how long the segments last that an orbit is solved with, shape (N,)."""
-    times = point.joints[:, 0]
-    lasts: FloatArray = np.append(times[1:], times[0] + orbit.turn) - times
-    return lasts
+    return point.orbit(orbit, active).durations[: orbit.system.segments]
 
 
-def _rates(point: Point) -> FloatArray:
-    """Return how the lengths change along the branch; that of the last segment as the period does not."""
-    rates: FloatArray = np.diff(point.tangent[:, 0], append=point.tangent[0, 0])
+def _rates(point: Point, orbit: Orbit, active: int) -> FloatArray:
+    """Return how the lengths change along the branch."""
+    turn = float(closing(point.orbit(orbit, active), active)[0]) * point.slope
+    rates: FloatArray = np.diff(point.tangent[:, 0], append=point.tangent[0, 0] + turn)
     return rates
 
 
@@ -151,9 +151,9 @@ def _lost_twins(then: FloatArray, now: FloatArray) -> list[int]:
     return equal if lost else []
 
 
-def _stays(orbit: Orbit, there: Point, twins: list[int], before: float) -> bool:
+def _stays(orbit: Orbit, there: Point, twins: list[int], active: int, before: float) -> bool:
     """Tell whether a point is on the branch: no margin is violated, and the twins are equal and shorter."""
-    lasts = _lasts(orbit.system, there, orbit)[twins]
+    lasts = _lasts(there, orbit, active)[twins]
     tests = there.tests[: len(orbit.system.tests)]
     equal = np.ptp(lasts) <= _UNEQUAL * float(np.max(lasts))
     return bool(np.min(tests) >= 0.0 and np.min(lasts) > 0.0 and np.max(lasts) < before and equal)

@@ -176,11 +176,11 @@ def rate_scale(orbit: Orbit, mode: str, surface: str) -> float:
     the surface in a period.
     """
     flow, observable = orbit.flow, orbit.model.surface_by_name[surface].observable
-    period, largest = orbit.period, 0.0
+    period, level, largest = orbit.period, orbit.flow.level(surface), 0.0
     phases = [0.0] if orbit.model.autonomous else [k / _PHASES * period for k in range(_PHASES)]
     for end in orbit.ends:
-        time, y = float(end[0]), end[1:]
-        largest = max(largest, abs(flow.height(surface, time, y)) / period)
+        time, y = float(end[0]), np.ascontiguousarray(end[1:])
+        largest = max(largest, abs(flow.observe(observable, time, y) - level) / period)
         for phase in phases:
             largest = max(largest, abs(flow.rate(mode, observable, time + phase, y)))
     return largest
