@@ -64,6 +64,10 @@ class Overshoot(Enum):
     ENDED = auto()
 
 
+#: Multiplier from which on a segment's end tells nothing of its start to rounding, and Newton's method fails.
+_LOST = 1e12
+
+
 def overshoots_vertex(orbit: Orbit, side: Side, settings: Settings, written: int) -> Overshoot:
     """End a side where its last points have passed a vertex that no fold has shown, or take them back.
 
@@ -303,4 +307,7 @@ def _multipliers(here: Orbit) -> str:
     text = f"{nearest.real:.6g}" + (f"{nearest.imag:+.6g}i" if nearest.imag else "")
     if abs(nearest - 1.0) < _AT_ONE:
         return f"{stalled}; a multiplier is at +1 ({text}): a fold or a branch point is near"
+    far = float(np.max(np.abs(mu)))
+    if far > _LOST:
+        return f"{stalled}; a disturbance grows {far:.0e} times in a turn, more than sixteen digits can follow"
     return f"{stalled}; no multiplier is at +1 (the nearest is {text})"
