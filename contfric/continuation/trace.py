@@ -293,7 +293,7 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
 
 
 def _crawls(side: Side) -> bool:
-    """Tell whether hundreds of steps have got nowhere: Newton's method fails by rounding at any longer one."""
+    """Tell whether hundreds of steps have got nowhere: Newton's method fails by rounding at longer ones."""
     arc = side.rows.arc
     return side.last + 1 >= CHUNK and float(arc[side.last] - arc[1]) < CHUNK * _CRAWLS
 

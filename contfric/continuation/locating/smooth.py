@@ -70,8 +70,8 @@ def smooth_events(step: Step) -> list[Located]:
     slides = step.beyond is not step.after
     step = altered(step, after=last_told(step) or step.after)
     told = first_told(step)
-    first = [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()]
-    values = [*zip(first, step.after.tests[base:].tolist(), strict=True)]
+    starts = [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()]
+    values = [*zip(starts, step.after.tests[base:].tolist(), strict=True)]
     found: list[Located] = []
     folded = False
     both = np.array([values[CHI_ONE], values[CHI_MINUS]])
