@@ -9,6 +9,10 @@ What an itinerary conserves is taken away in the same way (:mod:`contfric.bvp.co
 Of an autonomous model a shift in time is mapped to itself: M is block triangular with a 1 for dt_0, the
 trivial multiplier, and the map of the states in the section. Its first column is made zero, which takes
 the trivial multiplier away exactly, and leaves one direction less.
+
+Where disturbances grow far in a turn the entries of M are large, and the other multipliers are lost in their
+rounding; so is the sign of ``chi(s) = det(1 - s M)``, which tells of events. The pencil of the turn has
+entries of order 1 however far they grow: ``chi(s) = det(Q K + s P) / det(Q K)``.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ _geev = types.ExternalFunction(
     ),
 )
 _DOUBLE, _NO = ord("d"), ord("N")
+#: Multiplier from which on the determinants are those of the pencil: below it four digits are lost at most.
+_GROWN = 1e4
 
 
 @helper
@@ -81,11 +87,18 @@ def largest_of(m, rank, out, real, imaginary, copy):  # type: ignore[no-untyped-
 
 @helper
 def determinant(m, sign, copy):  # type: ignore[no-untyped-def]
-    """Return det(1 + sign m), by elimination with row exchanges."""
-    size, value = m.shape[0], 1.0
+    """Return det(1 + sign m)."""
+    size = m.shape[0]
     for i in range(size):
         for j in range(size):
             copy[i, j] = sign * m[i, j] + (1.0 if i == j else 0.0)
+    return eliminated(copy)
+
+
+@helper
+def eliminated(copy):  # type: ignore[no-untyped-def]
+    """Return the determinant of a matrix, by elimination with row exchanges in its place."""
+    size, value = copy.shape[0], 1.0
     for k in range(size):
         best = k
         for i in range(k + 1, size):
@@ -175,6 +188,45 @@ def take_away(turn, directions):  # type: ignore[no-untyped-def]
 
 
 @helper
+def pencil_determinant(q, close, sign, p, copy):  # type: ignore[no-untyped-def]
+    """Return det(Q K + sign P)."""
+    size = q.shape[0]
+    for i in range(size):
+        for j in range(size):
+            value = sign * p[i, j]
+            for k in range(size):
+                value += q[i, k] * close[k, j]
+            copy[i, j] = value
+    return eliminated(copy)
+
+
+@helper
+def of_grown(layout, pencil, close, rank, out, workspace):  # type: ignore[no-untyped-def]
+    """Return (chi(1), chi(-1)) by determinants of the pencil; of two real multipliers write the small one.
+
+    Infinite where the map of the turn is: then neither is known.
+    """
+    p, copy, timeless = workspace.left, workspace.product, close[0, 0] == 0.0
+    size = p.shape[0]
+    for i in range(size):
+        for j in range(size):
+            p[i, j] = 0.0 if timeless and j == 0 else pencil[0, i, j]
+    take_away(p, layout.conserved)
+    close[0, 0] = 1.0
+    base = pencil_determinant(pencil[1], close, 0.0, p, copy)
+    one = pencil_determinant(pencil[1], close, 1.0, p, copy)
+    minus = pencil_determinant(pencil[1], close, -1.0, p, copy)
+    if timeless:
+        close[0, 0] = 0.0
+    if base == 0.0:
+        return np.inf, np.inf
+    one, minus = one / base, minus / base
+    if rank == 2 and out[0].imag == 0.0 and abs(out[1]) < abs(out[0]) * 1e-8:
+        out[1] = (0.5 * (one + minus) - 1.0) / out[0].real
+    return one, minus
+
+
+@helper
 def multipliers(layout, pencil, close, out, workspace):  # type: ignore[no-untyped-def]
     """Write the multipliers of one turn from its pencil; return (chi(1), chi(-1))."""
     n = out.shape[0]
@@ -191,7 +243,12 @@ def multipliers(layout, pencil, close, out, workspace):  # type: ignore[no-untyp
         return np.nan, np.nan
     take_away(workspace.turn, layout.conserved)
     rank = max(0, min(layout.rank, n))
-    return spectrum(workspace.turn, rank, out, workspace.real, workspace.left, workspace.product)
+    one, minus = spectrum(
+        workspace.turn, rank, out, workspace.real, workspace.left, workspace.product
+    )
+    if rank > 1 and abs(out[0]) > _GROWN and abs(out[0]) < np.inf:
+        return of_grown(layout, pencil, close, rank, out, workspace)
+    return one, minus
 
 
 @kernel(types.UniTuple(f8, 2)(LayoutType, blocks, types.complex128[::1], indices))

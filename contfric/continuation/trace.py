@@ -33,7 +33,7 @@ from contfric.continuation.ends.at_values import stop_among
 from contfric.continuation.ends.at_vertices import Overshoot, end_stalled, overshoots_vertex
 from contfric.continuation.events_of_step import end_of_holds, resolve
 from contfric.continuation.families.vertical import VerticalFamily, family_near
-from contfric.continuation.half_branch import Side, first_point
+from contfric.continuation.half_branch import CHUNK, Side, first_point
 from contfric.continuation.located_event import ROUGH
 from contfric.continuation.locating.sliding import met_together
 from contfric.continuation.moving_joints import move_joints
@@ -253,6 +253,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     stopped = bool(settings.stop_at) and stop_among(orbit, side, settings, fresh, last)
     if stopped or ended:
         return True, step
+    if why == kernels.FULL and _crawls(side):
+        why = kernels.STEP
     if why in (kernels.STEP, kernels.BROKEN) and move_joints(orbit, side, settings):
         return False, FIRST_STEP * settings.largest
     reasons = {
@@ -288,6 +290,12 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
     if why == kernels.FULL:
         return end_of_holds(orbit, side, settings, step < _CRAWLS), step
     return resolve(orbit, side, settings), step
+
+
+def _crawls(side: Side) -> bool:
+    """Tell whether hundreds of steps have got nowhere: Newton's method fails by rounding at longer ones."""
+    arc = side.rows.arc
+    return side.last + 1 >= CHUNK and float(arc[side.last] - arc[1]) < CHUNK * _CRAWLS
 
 
 def _tip(orbit: Orbit, side: Side, settings: Settings) -> Orbit:

@@ -59,3 +59,26 @@ def test_the_first_point_of_a_branch_has_labels_of_its_own() -> None:
                 asked += 1
                 assert any(np.array_equal(branch.labels[0], branch[k].labels) for k in (0, 1))
     assert asked > 5
+
+
+def test_tangencies_of_many_crossings_are_where_they_are() -> None:
+    """Labels longer than 53 bits were compared as numbers with 53: each T was there twice, at ends of steps.
+
+    The force of the model jumps at a time at which the velocity is zero: solved by an integration of its own.
+    """
+    orbit = cf.find_orbit("bang-bang", {"om": 0.0404})
+    branch = cf.continue_orbit(orbit, "om", (0.035, 0.042))
+    events = [b for b in branch.bifurcations if b.kind.name == "T"]
+    assert (
+        len(events) == 3
+    )  # one for each turn of the free oscillation, of 4.07, that comes into half a period
+    for event in events:
+        p, start = event.params, event.orbit.begins[0]
+        push = np.sign(np.sin(p["om"] * (start[0] + 1e-6)))
+
+        def field(_: float, y: np.ndarray, push: float = push, p: dict = p) -> list[float]:
+            return [y[1], push * p["A"] - p["la"] * y[1] - p["al"] * y[0] - p["ep"] * y[0] ** 3]
+
+        half = np.pi / p["om"]
+        end = solve_ivp(field, (0.0, half), start[1:], method="DOP853", rtol=1e-12, atol=1e-13)
+        assert abs(end.y[1, -1]) < 1e-11

@@ -102,7 +102,7 @@ class Sought(NamedTuple):
     ----------
     kind : BY_TEST, BY_LABEL or BY_PARAMETER
     number : column of the tests, or row of the labels
-    target : the label before, or the value of the parameter of a branch
+    target : the value of the parameter of a branch
     planes : of a curve by parameters: rows (a, b, c), of which the least of ``a p + b q + c`` vanishes
     plain : counts the values for which a label was that of one of the two points, shape (1,)
     """
@@ -134,7 +134,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
             sought.plain[0] += 1
         # the distance of the nearest stationary point to a surface vanishes where the label changes;
         # elsewhere a joint may lie on a surface
-        return nearest if code == int(sought.target) else -max(nearest, 1e-300)
+        return nearest if code == labels[0, index] else -max(nearest, 1e-300)
     if index < margins:
         way.counts[CHECKS] += 1
         return margin_value(functions, layout, index, z, p, workspace)

@@ -45,6 +45,7 @@ from contfric.continuation.core.steps import (
     changed,
     correct_branch,
     observe_branch,
+    told,
 )
 
 #: Why a march stopped.
@@ -76,7 +77,8 @@ def arrival(way, course, k, taken, step):  # type: ignore[no-untyped-def]
     """Return why the march stops at row k, or FULL if it goes on."""
     points = course.points
     zs, ws, tests, labels = points.joints, points.w, points.tests, points.labels
-    if changed(tests[k - 1], tests[k], labels[k - 1], labels[k]):
+    known = told(way.layout, zs[k])
+    if changed(tests[k - 1], tests[k], labels[k - 1], labels[k], known):
         return EVENT
     if outside(ws[k], course.box):
         return OUTSIDE

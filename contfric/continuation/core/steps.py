@@ -8,7 +8,8 @@ import numpy as np
 from numba import types
 
 from contfric.base.arrays import FloatArray, IntArray
-from contfric.bvp.convergence import CONVERGED, NOT_FINITE
+from contfric.bvp.convergence import CONVERGED, NOT_FINITE, rounding_of
+from contfric.bvp.crossed_surfaces import TOUCH
 from contfric.bvp.cyclic import Elimination, elimination_workspace
 from contfric.bvp.equations import EquationWorkspace, LayoutType, close_chain, equation_workspace
 from contfric.bvp.monitor import watch
@@ -17,7 +18,13 @@ from contfric.bvp.spectrum import SpectralWorkspace, multipliers, spectral_works
 from contfric.bvp.stationary_points import StationaryPoints, stationary_workspace
 from contfric.bvp.stationary_values import Followed, followed_values, remember
 from contfric.compiled import allocating_helper, helper, indices, vector
-from contfric.continuation.core.geometry import anchor, copy_to, copy_vector, take_tangent
+from contfric.continuation.core.geometry import (
+    anchor,
+    copy_to,
+    copy_vector,
+    largest_state,
+    take_tangent,
+)
 from contfric.flow.layouts import FlowType
 
 #: Extra columns of the tests after the margins and the distances of the labels: slope of the
@@ -28,6 +35,10 @@ EXTRA = 4
 #: Correction that ends the iteration where an event is located: its test function counts to its last
 #: digits.
 AT_EVENT = 3e-15
+#: How many times the rounding of an orbit a stationary value is off at most.
+TOLD = 10.0
+#: A product of multipliers from which on one of them is infinite to half of the digits.
+INFINITE = 1e8
 
 
 class StepWorkspace(NamedTuple):
@@ -206,16 +217,50 @@ def accept_branch(way):  # type: ignore[no-untyped-def]
 
 
 @helper
-def changed(before, after, labels_before, labels_after):  # type: ignore[no-untyped-def]
-    """Tell whether any test changes sign or any label changes between two points."""
-    margins = before.shape[0] - EXTRA
-    for j in range(margins):
+def told(layout, z):  # type: ignore[no-untyped-def]
+    """Return the distance of a stationary value from a surface from which on rounding can tell its side."""
+    return TOLD * rounding_of(layout, z) * (1.0 + largest_state(z))
+
+
+@helper
+def through_infinity(before, after):  # type: ignore[no-untyped-def]
+    """Tell whether both products of multipliers change their signs far from zero: the largest one does."""
+    at, least = before.shape[0] - EXTRA, np.inf
+    for j in (at + CHI_ONE, at + CHI_MINUS):
+        if not before[j] * after[j] < 0.0:
+            return False
+        least = min(least, abs(before[j]), abs(after[j]))
+    return least > INFINITE
+
+
+@helper
+def turns_to_rounding(before, after, known):  # type: ignore[no-untyped-def]
+    """Tell whether turns of a label lie on either side of a surface by rounding, at two points.
+
+    As those of a motion that has died out do. What touches a surface all along is at zero, and leaves the
+    label as it is. Parameters: distances of the nearest change, and what is told (:func:`told`).
+    """
+    return TOUCH < max(before, after) < known
+
+
+@helper
+def changed(before, after, labels_before, labels_after, known):  # type: ignore[no-untyped-def]
+    """Tell whether any test changes sign or any label changes between two points; ``known``: :func:`told`."""
+    first = before.shape[0] - EXTRA
+    margins = first - labels_before.shape[0]
+    for j in range(first):
         if after[j] < 0.0:
             return True
-    for j in range(margins, before.shape[0]):
-        if before[j] * after[j] < 0.0:
+    if before[first + FOLD] * after[first + FOLD] < 0.0:
+        return True
+    if before[first + CHI_PAIR] * after[first + CHI_PAIR] < 0.0:
+        return True
+    for j in (first + CHI_ONE, first + CHI_MINUS):
+        if before[j] * after[j] < 0.0 and not through_infinity(before, after):
             return True
     for j in range(labels_before.shape[0]):
-        if labels_before[j] != labels_after[j]:
+        if labels_before[j] != labels_after[j] and not turns_to_rounding(
+            before[margins + j], after[margins + j], known
+        ):
             return True
     return False

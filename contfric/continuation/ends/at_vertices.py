@@ -51,6 +51,8 @@ _NEAR = 1e-2
 _AT_ONE = 1e-2
 
 
+#: Multiplier from which on a segment's end tells nothing of its start to rounding, and Newton's method fails.
+_LOST = 1e12
 #: Distance (arclength) from a vertex at which its branch is asked what is just before it: states are known
 #: there to the root of rounding.
 _NEXT_TO = 1e-5
@@ -303,4 +305,7 @@ def _multipliers(here: Orbit) -> str:
     text = f"{nearest.real:.6g}" + (f"{nearest.imag:+.6g}i" if nearest.imag else "")
     if abs(nearest - 1.0) < _AT_ONE:
         return f"{stalled}; a multiplier is at +1 ({text}): a fold or a branch point is near"
+    far = float(np.max(np.abs(mu)))
+    if far > _LOST:
+        return f"{stalled}; disturbances grow {far:.0e} times in a turn: sixteen digits do not follow that"
     return f"{stalled}; no multiplier is at +1 (the nearest is {text})"

@@ -79,8 +79,7 @@ def locate_label(
 
     found = []
     for one, other in ((before, after), (after, before)):
-        target = float(one.labels[index])
-        point, plain = _located(orbit, one, other, settings, BY_LABEL, index, target)
+        point, plain = _located(orbit, one, other, settings, BY_LABEL, index, 0.0)
         found += [] if point is None else [point]
         if point is not None and plain and point.arc != one.arc:
             break

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from contfric.base.attributes import altered
+from contfric.bvp.crossed_surfaces import TOUCH
 from contfric.bvp.system import EventFunction, Margin
 from contfric.continuation.accuracy.near_sliding_events import (
     NO_LENGTH,
@@ -61,7 +62,7 @@ _COMPLEX = 1e-6
 def smooth_events(step: Step) -> list[Located]:
     """Return folds, branch points, doublings, tori and tangencies."""
     from contfric.continuation.core.locate import BY_TEST
-    from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD
+    from contfric.continuation.core.steps import CHI_MINUS, CHI_ONE, CHI_PAIR, FOLD, INFINITE
 
     orbit, before = step.orbit, step.before
     base = len(before.tests) - EXTRA
@@ -70,16 +71,18 @@ def smooth_events(step: Step) -> list[Located]:
     slides = step.beyond is not step.after
     step = altered(step, after=last_told(step) or step.after)
     told = first_told(step)
-    values = zip(
-        [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()],
-        step.after.tests[base:].tolist(),
-        strict=True,
-    )
+    starts = [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()]
+    values = [*zip(starts, step.after.tests[base:].tolist(), strict=True)]
     found: list[Located] = []
     folded = False
-    for column, (a, b) in zip((FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR), values, strict=True):
+    both = np.array([values[CHI_ONE], values[CHI_MINUS]])
+    # the largest multiplier changes its sign through infinity, or by rounding next to it
+    infinite = bool(np.all(both[:, 0] * both[:, 1] < 0.0) and np.abs(both).min() > INFINITE)
+    for column, (a, b) in enumerate(values):
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it
+        if infinite and column in (CHI_ONE, CHI_MINUS):
+            continue
         if max(abs(a), abs(b)) < LEVEL * (size if column == FOLD else 1.0):
             continue  # zero on both sides: a continuum of orbits, and the sign is rounding
         if column != FOLD and _is_rounding(altered(step, before=told), base + column):
@@ -234,9 +237,21 @@ def tangencies(step: Step) -> list[Located]:
     if same and not (at_event(step.before) or at_event(step.after)):
         return found
     for k in (step.before.labels != step.after.labels).nonzero()[0].tolist():
-        found += _changes(step, k)
+        found += _changes(step, k) if _is_told(step, k) else []
     found += _undone(step, found)
     return _once(found) if step.orbit.model.joined else found
+
+
+def _is_told(step: Step, k: int) -> bool:
+    """Tell whether rounding can tell on which side the turns of a label are, as the march asks it."""
+    from contfric.bvp.convergence import INTEGRATED
+    from contfric.continuation.core.steps import TOLD
+
+    at = len(step.before.tests) - EXTRA - len(step.before.labels) + k
+    joints, rounding = step.after.joints, step.orbit.system.layout.rounding
+    turn = 0.0 if rounding > INTEGRATED else abs(float(joints[-1, 0]))
+    known = TOLD * rounding * (1.0 + turn) * (1.0 + float(np.abs(joints[:, 1:]).max()))
+    return not TOUCH < max(step.before.tests[at], step.after.tests[at]) < known
 
 
 def _changes(step: Step, k: int) -> list[Located]:

@@ -131,11 +131,11 @@ def by_test(index: int) -> Sought:
     return sought_of(BY_TEST, index)
 
 
-def by_label(row: int, before: int) -> Sought:
+def by_label(row: int) -> Sought:
     """Return the search for the change of one label."""
     from contfric.continuation.core.locate import BY_LABEL
 
-    return sought_of(BY_LABEL, row, float(before))
+    return sought_of(BY_LABEL, row)
 
 
 def by_location(planes: FloatArray) -> Sought:

@@ -168,8 +168,7 @@ def _labels(step: CurveStep[Problem]) -> list[LocatedChange]:
     observables = problem.model.observables
     found = []
     for k in np.flatnonzero(before.labels != after.labels):
-        old = int(before.labels[k])
-        point, _ = step.located(by_label(int(k), old))
+        point, _ = step.located(by_label(int(k)))
         test = EventFunction(Margin.INTERIOR, int(rows[k][0]), observables[int(rows[k][1])].name)
         special = _special(problem, point, CodimTwo.MEETS, Kind.T, (test,))
         found.append(LocatedChange(point, special, False))

@@ -34,7 +34,7 @@ def value_of(sought, points, row):  # type: ignore[no-untyped-def]
     if sought.kind == BY_LABEL:
         margins = tests.shape[1] - labels.shape[1] - EXTRA
         size = max(tests[row, margins + sought.number], 1e-300)
-        return size if labels[row, sought.number] == sought.target else -size
+        return size if labels[row, sought.number] == labels[0, sought.number] else -size
     least, planes = np.inf, sought.planes
     for k in range(planes.shape[0]):
         value = planes[k, 0] * ws[row, 0] + planes[k, 1] * ws[row, 1] + planes[k, 2]
