@@ -159,7 +159,7 @@ def _pairs(model: Model) -> Iterator[tuple[str, str, str]]:
     seen = set()
     for domain in model.domains:
         for surface in model.surfaces:
-            if domain.signs[surface.name] != 1 or surface.name in resets:
+            if domain.signs.get(surface.name) != 1 or surface.name in resets:
                 continue
             for other in model.domains:
                 if other.signs != {**domain.signs, surface.name: -1} or other.mode == domain.mode:

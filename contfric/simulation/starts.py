@@ -11,9 +11,11 @@ from contfric.base.arrays import FloatArray
 from contfric.errors import ParameterError, did_you_mean, shown
 from contfric.models.check.probe import Probe
 from contfric.models.definition import Domain, Model, Surface
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.mode_domains import cut_bounds
 from contfric.models.parts import Chatter
 from contfric.models.shorthand.clocks import TICK, is_clock
+from contfric.models.structures.contacts import ContactKind
 from contfric.simulation.entered_domain import StartState, entered_domain
 from contfric.simulation.excitation import check_excitation
 from contfric.simulation.tables import bits_of
@@ -79,7 +81,7 @@ def start_of(
         name = name or _side_of_rates(model, t, y, vector, exact)
         if name is None and (name := entered_domain(start, met, standing=True)):
             signs = met
-    if name is None:
+    if name is None or (named is None and _is_beyond(model, start, exact)):
         nearest = sorted(start.heights.items(), key=lambda item: abs(item[1]))[:_SURFACES_SHOWN]
         heights = ", ".join(f"{k}: {h:+.3g}" for k, h in nearest)
         raise ParameterError(
@@ -92,6 +94,18 @@ def start_of(
         mode = _let_go(model, rest, t, y, vector, signs) or mode
     on = bits_of(model, (k for k in cut_bounds(model)[mode] if signs.get(k, 1) == 0))
     return model.mode_index[mode], on
+
+
+def _is_beyond(model: Model, start: StartState, exact: dict[str, int]) -> bool:
+    """Tell whether a Jenkins element is stretched beyond its limit, where modes are made when visited."""
+    if not isinstance(model, ComposedModel):
+        return False
+    return any(
+        exact[f"{c.name}{sign}"] == side and not start.lies_on(f"{c.name}{sign}")
+        for c in model.composition.acting
+        if c.kind is ContactKind.JENKINS
+        for sign, side in (("+", 1), ("-", -1))
+    )
 
 
 def _at_phase(start: StartState, domain: str | None, signs: dict[str, int]) -> str | None:

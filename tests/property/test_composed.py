@@ -293,3 +293,25 @@ def test_the_field_of_a_visited_mode_is_that_of_its_flow(seed: int) -> None:
         y = probe.flow.state(mode.name, t, guess, 0.0)
         rate = probe.flow.jacobian(mode.name, t, y, 0.0)[:, 1 + len(y)]
         assert probe.field(mode.name, t, y) == pytest.approx(rate, abs=1e-12)
+
+
+@pytest.mark.parametrize(("element", "side"), [("weak", 1.0), ("strong", -1.0)])
+def test_a_state_beyond_the_limit_of_an_element_is_none(
+    composing: Any, element: str, side: float
+) -> None:
+    model, state = composing(structure, 3, "composed"), np.zeros(10)
+    place = model.states.index(element)
+    limit = PARAMETERS["S"] / PARAMETERS["kd"] * (2.7 if element == "strong" else 1.0)
+    state[place] = side * limit * (1.0 + 1e-9)
+    with pytest.raises(ParameterError, match="is in no domain"):
+        cf.simulate(model, state=state, periods=1.0)
+    state[place] = side * limit  # at its limit it may be
+    assert len(cf.simulate(model, state=state, periods=1.0))
+
+
+def test_the_check_of_a_composed_model_knows_what_acts_when_contacts_slide(composing: Any) -> None:
+    for model in (composing(structure, 0, "composed"), chain(5, 10, "row")):
+        report = cf.check_model(model)
+        assert report.ok and not [f for f in report.findings if f.severity.value != "note"], str(
+            report
+        )

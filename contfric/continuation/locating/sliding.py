@@ -123,6 +123,7 @@ def _first_located(
 
     What comes first ends the branch; what vanishes with it is of its group. They are asked in the order of
     their secants: one that is still positive where another vanishes vanishes behind it, and is not located.
+    Nor is one that is positive where Newton's method fails: trials beyond take it tens of steps each.
     """
     from contfric.continuation.core.locate import BY_TEST
 
@@ -136,6 +137,8 @@ def _first_located(
     for k in sorted(share, key=share.__getitem__):
         if best is not None and _is_behind(orbit, before, best[2], after, (best[1], k)):
             continue
+        if best is not None and best[2].lost and best[2].tests[k] > 0.0:
+            continue  # it vanishes later, if trials do not fail there
         point = locate_change(orbit, before, after, settings, BY_TEST, k)
         if point is not None and (best is None or (point.arc, k) < best[:2]):
             best = point.arc, k, point

@@ -6,6 +6,7 @@ from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
 from contfric.models.check.structure import arrivals
 from contfric.models.definition import Model
+from contfric.models.deriving.growing_model import ComposedModel
 from contfric.models.language.grammar import parse
 
 #: Starts on each surface: a check takes a moment, and a set of two-folds is hit by most of them.
@@ -39,7 +40,10 @@ def check_names(report: ModelReport, model: Model) -> None:
         return
     description = model.description
     names, used = description.names, set[str]()
-    dynamics = [rate for mode in description.modes for rate in mode.field]
+    modes = list(description.modes)
+    if isinstance(model, ComposedModel):  # which lists the mode in which no contact acts
+        modes += map(model.composition.text, model.composition.samples()[1:])
+    dynamics = [rate for mode in modes for rate in mode.field]
     events = [o.formula for o in description.observables] + [s.level for s in description.surfaces]
     resets = [text for texts in description.resets.values() for text in texts.values()]
     for text in (*dynamics, *events, *resets, description.period or "0"):
@@ -54,7 +58,7 @@ def check_names(report: ModelReport, model: Model) -> None:
             report.warn(Topic.NAMES, f"'{text}: {tree}' of 'define' is used nowhere: leave it out")
     for index, state in enumerate(names.states):
         report.count(Topic.NAMES)
-        rates = [mode.field[index].strip() for mode in description.modes]
+        rates = [mode.field[index].strip() for mode in modes]
         moved = any(rate not in ("0", "0.0") for rate in rates)
         if not moved and not any(state in texts for texts in description.resets.values()):
             report.warn(

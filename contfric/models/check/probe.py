@@ -8,7 +8,7 @@ import random
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -53,6 +53,14 @@ def field_of(model: Model) -> Any:
     definition = flow.definition if isinstance(flow, GeneratedFlow) else model.definition
     found = coded_flow(definition)
     return load_module(definition).field_of if found is None else found.field
+
+
+class _Region(NamedTuple):
+    """Surfaces that a mode moves on, surfaces that it knows, and the sides of these in its domains."""
+
+    on: tuple[str, ...]
+    known: tuple[str, ...]
+    sides: set[tuple[int, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,19 +110,24 @@ class Probe:
         return {s.name: self.flow.level(s.name) for s in self.model.surfaces}
 
     @cached_property
-    def _regions(self) -> dict[str, tuple[tuple[str, ...], frozenset[tuple[int, ...]]]]:
-        """The surfaces that each mode moves on, and the sides of all surfaces in its domains."""
+    def _regions(self) -> dict[str, _Region]:
+        """The surfaces that each mode moves on, those that bound it, and their sides in its domains.
+
+        A mode that is made when it is visited knows the surfaces of its own contacts only.
+        """
         order = [s.name for s in self.model.surfaces]
-        found: dict[str, tuple[tuple[str, ...], set[tuple[int, ...]]]] = {}
+        found: dict[str, _Region] = {}
         for domain in self.model.domains:
             on = tuple(name for name, side in domain.signs.items() if side == 0)
-            _, sides = found.setdefault(domain.own_mode, (on, set()))
-            sides.add(tuple(domain.signs[name] for name in order))
-        return {mode: (on, frozenset(sides)) for mode, (on, sides) in found.items()}
+            known = tuple(name for name in order if name in domain.signs)
+            region = found.setdefault(domain.own_mode, _Region(on, known, set()))
+            region.sides.add(tuple(domain.signs[name] for name in known))
+        return found
 
     def is_in(self, mode: str, signs: Mapping[str, int]) -> bool:
         """Tell whether the sides of all surfaces are those of a domain of a mode."""
-        return tuple(signs[s.name] for s in self.model.surfaces) in self._regions[mode][1]
+        region = self._regions[mode]
+        return tuple(signs[name] for name in region.known) in region.sides
 
     def slope(self, surface: str, t: float, y: FloatArray) -> FloatArray:
         """Return the gradient of a surface's observable, shape (1 + n,)."""
@@ -198,7 +211,7 @@ class Probe:
 
     def in_region(self, mode: str, t: float, y: FloatArray) -> Place | None:
         """Return a state of a mode near a state, whether its field has a value there or not."""
-        on, _ = self._regions[mode]
+        on = self._regions[mode].on
         place = self.landed(on, t, y) if on else (t, y)
         if place is None:
             return None

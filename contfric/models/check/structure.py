@@ -117,11 +117,10 @@ def _made(probe: Probe) -> set[tuple[str, str, str]]:
     found: set[tuple[str, str, str]] = set()
     for surface in model.surfaces:
         for t, y in probe.on(surface.name, _ON_SURFACE):
-            signs = probe.signs(t, y)
+            on = {**probe.signs(t, y), surface.name: 0}
             for domain in model.domains:
-                side = domain.signs[surface.name]
-                others = (s for s in signs if s != surface.name)
-                if not side or any(signs[s] != domain.signs[s] for s in others):
+                side = domain.signs.get(surface.name, 0)
+                if not side or not {**domain.signs, surface.name: 0}.items() <= on.items():
                     continue
                 key = domain.name, surface.name
                 seen.add(key)
@@ -158,8 +157,8 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
         if list(signs.values()).count(0) != 1 or _behind_wall(probe, {**signs}):
             continue
         for domain in model.domains:
-            side, name = domain.signs[surface.name], domain.name
-            if not side or domain.signs != {**signs, surface.name: side}:
+            side, name = domain.signs.get(surface.name, 0), domain.name
+            if not side or not {**domain.signs, surface.name: 0}.items() <= signs.items():
                 continue
             if model.maps_at(domain, surface.name) or model.ends_at(domain, surface.name):
                 continue  # what its reset does is another matter, and so is that nothing follows it
@@ -209,7 +208,7 @@ def _goes_on(
 ) -> bool:
     """Return whether motion can enter what follows; else it is sent back at once, for ever."""
     domain = probe.model.domain_by_name[following]
-    side = domain.signs[surface.name]
+    side = domain.signs.get(surface.name, 0)
     back = probe.model.transitions.get((following, surface.name))
     if probe.model.maps_at(domain, surface.name):
         return True  # it is mapped at once

@@ -188,6 +188,13 @@ class Composition:
         kept = Made(key_of, self.is_mode)
         return ContactLaws(contact.name, kept, texts, **rest_of(self.structure, contact))
 
+    def samples(self) -> tuple[str, ...]:
+        """Return modes in which each contact is in each of its states; in the first none acts."""
+        count = max(len(c.states) for c in self.acting)
+        return tuple(
+            "".join(c.states[min(k, len(c.states) - 1)] for c in self.acting) for k in range(count)
+        )
+
     def check(self) -> None:
         """Read the rates of all contacts in each of their states; what cannot be read is reported.
 
@@ -197,8 +204,7 @@ class Composition:
             With the reason, where a force is not affine.
         """
         forms = Forms(self._description)
-        for letter in range(max(len(c.states) for c in self.acting)):
-            name = "".join(c.states[min(letter, len(c.states) - 1)] for c in self.acting)
+        for name in self.samples():
             forms.add(self.text(name), self.loads_in(name))
 
     # --------------------------------------------------------------------------- what follows
@@ -304,19 +310,14 @@ class Composition:
     @property
     def rested_on(self) -> frozenset[str]:
         """The surfaces that some mode moves on."""
-        found: set[str] = set()
-        for c in self.acting:
-            if c.kind is ContactKind.FRICTION:
-                found.add(c.name)
-            elif c.kind is ContactKind.JENKINS:
-                found |= {f"{c.name}+", f"{c.name}-"}
-        return frozenset(found)
+        rubs = {c.name for c in self.acting if c.kind is ContactKind.FRICTION}
+        elastic = [c.name for c in self.acting if c.kind is ContactKind.JENKINS]
+        return frozenset({*rubs, *(f"{name}{sign}" for name in elastic for sign in "+-")})
 
     @property
     def switching(self) -> frozenset[str]:
         """The surfaces at which motion is cut: those that are rested on, and the ends of gaps."""
-        gaps = {c.name for c in self.acting if c.kind is ContactKind.SPRING}
-        return self.rested_on | gaps
+        return self.rested_on | {c.name for c in self.acting if c.kind is ContactKind.SPRING}
 
     @property
     def leaves_at_rest(self) -> bool:

@@ -153,7 +153,8 @@ def _parting(trajectory: Trajectory, done: int) -> str:
     """Return what two solutions say that begin close to each other where a trajectory ends."""
     model, (_, time, state, _) = trajectory.model, trajectory.last
     moved = np.array([not is_clock(name) for name in model.states])
-    shift = moved * _APART * (1.0 + np.abs(state)) * (-1.0) ** np.arange(len(state))
+    towards = np.where(state == 0.0, (-1.0) ** np.arange(len(state)), -np.sign(state))
+    shift = moved * _APART * (1.0 + np.abs(state)) * towards  # no element goes beyond its limit
     least = _COMPARED
     if model.autonomous:  # a unit of time says nothing of how often something happens
         passed = float(trajectory.last[1]) - trajectory.begin[0]

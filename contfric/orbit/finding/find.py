@@ -36,6 +36,7 @@ from contfric.orbit.finding.rest import (
     winds,
     without_an_end,
 )
+from contfric.orbit.finding.simultaneous import in_order
 from contfric.orbit.finding.sizes import warn_of_sizes
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.positions.kept import Places
@@ -223,6 +224,7 @@ class _Search:
         if self.longest is None:
             self.most = min(self.most, affordable(self.model, self.done, self.events))
         final = self.done >= self.most
+        trajectory = in_order(trajectory)
         orbit = orbit_come_to(trajectory, final)
         if orbit is not None and self.model.autonomous and is_point(orbit):
             raise ConvergenceError(comes_to_rest(trajectory), trajectory)
