@@ -157,10 +157,9 @@ def _check_crossings(report: ModelReport, probe: Probe, surface: Surface) -> Non
         signs = {**probe.signs(t, y), surface.name: 0}
         if list(signs.values()).count(0) != 1 or _behind_wall(probe, {**signs}):
             continue
-        for domain in model.domains:
+        next_to = [{**signs, surface.name: side} for side in (1, -1)]
+        for domain in (d for d in model.domains if d.signs in next_to):
             side, name = domain.signs[surface.name], domain.name
-            if not side or domain.signs != {**signs, surface.name: side}:
-                continue
             if model.maps_at(domain, surface.name) or model.ends_at(domain, surface.name):
                 continue  # what its reset does is another matter, and so is that nothing follows it
             rate = probe.rate(domain.own_mode, surface.name, t, y)
