@@ -157,16 +157,17 @@ def _pairs(model: Model) -> Iterator[tuple[str, str, str]]:
     """Yield (surface, mode above, mode below) wherever two fields that differ meet."""
     resets = {reset.surface for reset in model.resets}
     seen = set()
-    for domain in model.domains:
+    moving = [d for d in model.domains if not model.mode_by_name[d.mode].sliding]
+    by_signs: dict[tuple[int, ...], list[str]] = {}
+    for domain in moving:
+        by_signs.setdefault(tuple(domain.signs.values()), []).append(domain.mode)
+    for domain in moving:
         for surface in model.surfaces:
             if domain.signs.get(surface.name) != 1 or surface.name in resets:
                 continue
-            for other in model.domains:
-                if other.signs != {**domain.signs, surface.name: -1} or other.mode == domain.mode:
-                    continue
-                pair = surface.name, domain.mode, other.mode
-                moves = all(not model.mode_by_name[name].sliding for name in pair[1:])
-                if moves and pair not in seen:
+            for other in by_signs.get(tuple({**domain.signs, surface.name: -1}.values()), ()):
+                pair = surface.name, domain.mode, other
+                if other != domain.mode and pair not in seen:
                     seen.add(pair)
                     yield pair
 

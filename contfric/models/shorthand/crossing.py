@@ -153,7 +153,8 @@ class CrossingSurfaces:
 
     def text(self, formula: Any) -> str:
         """Return a formula as an expression of the model."""
-        return self.formulas.text((_short if self.varies else sympy.simplify)(formula))
+        # factors, as derivatives of an expanded quotient are long
+        return self.formulas.text((sympy.factor if self.varies else sympy.simplify)(formula))
 
     def field(self, values: tuple[Any, Any], on: tuple[int, ...]) -> dict[str, str]:
         """Return the field of both switches at some values, on some of the surfaces."""

@@ -189,7 +189,7 @@ def _known_on(formulas: Formulas, height: Any) -> dict[Any, Any]:
 class _Sliding:
     """The sliding mode of a surface between two modes: field and rates, as formulas and as texts.
 
-    ``somewhere`` is false where nothing ever slides; what else it has is then not there.
+    ``somewhere`` is false where nothing ever slides: there is no field then.
     """
 
     def __init__(
@@ -207,16 +207,17 @@ class _Sliding:
         self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
         largest = self.apart.subs(formulas.defaults) if self.constant else self.apart
         self.somewhere = not largest.is_nonpositive
-        if not self.somewhere:
-            return
-        pair = zip(up, down, strict=True)
-        self.field = [
+        self.pairs = [(a.subs(on), b.subs(on)) for a, b in zip(up, down, strict=True)]
+        self.states = description.states
+
+    def field(self) -> list[Any]:
+        """Return the convex combination of the fields on both sides that keeps the surface."""
+        return [
             a
             if sympy.expand(a - b) == 0
             else sympy.simplify((self.rate_down * a - self.rate_up * b) / self.apart)
-            for a, b in ((a.subs(on), b.subs(on)) for a, b in pair)
+            for a, b in self.pairs
         ]
-        self.states = description.states
 
 
 def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> None:
@@ -249,7 +250,7 @@ def _add(found: dict[str, Any], sliding: _Sliding, heights: dict[str, Any]) -> N
         heights[name] = rate
     found["modes"][own] = {
         "in": sides,
-        "field": dict(zip(sliding.states, map(sliding.text, sliding.field), strict=True)),
+        "field": dict(zip(sliding.states, map(sliding.text, sliding.field()), strict=True)),
         "derived": True,
     }
 

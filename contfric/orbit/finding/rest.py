@@ -32,9 +32,11 @@ _NO_SIZE = 1e-6
 #: Turns about a point: the last half of all events lie this near to each other (relative to 1 + the states),
 #: and the last quarter nearer than the one before it (by 2/3, where turns shrink like 1/n).
 _WOUND, _SHRINKS = 1e-3, 0.8
-#: Time of the last half of all events over that of the quarter before it, if they come ever faster: 1 by the
-#: law 1/n, 2 if they come evenly.
-_QUICKER = 1.3
+#: Time between events of the last quarter over that between those of the first thousandth, and of the second
+#: hundredth: less than 1/100, and 1/60, by the law 1/n, times what drives them back.
+_FASTER, _STILL_FASTER = 1e-2, 1e-1
+#: Periods in which the number of events doubles.
+_FEW = 4
 #: Powers of the law of a creep, and how well two estimates of it agree where it holds.
 _LEAST, _MOST, _AGREE = 0.9, 2.1, 0.1
 #: Farther by this, so that the contact sticks although the distance is an estimate.
@@ -86,22 +88,29 @@ def winds(trajectory: Trajectory) -> bool:
 
 
 def quickens(trajectory: Trajectory, period: float) -> bool:
-    """Tell whether events follow each other faster and faster without an end, within a period.
+    """Tell whether events follow each other faster and faster without an end, within few periods.
 
-    Turns about a place that moves take times like 1/n, as those of :func:`winds`. So the last half of all
-    events takes no longer than the quarter before it, where it is twice as long if they come evenly.
+    Turns about a place that moves take times like 1/n, as those of :func:`winds`, by a factor that changes
+    with what drives them back. So the last half of all events is within few periods, and they come 60 times
+    faster than at a hundredth of their number. Switches whose hysteresis falls slowly come faster, too, but
+    not by so much, or not for so long.
     """
-    times = trajectory.cycles * period + trajectory.times
-    quarter, half, last = (len(times) * k // 4 for k in (1, 2, 3))
-    before, lately = times[half] - times[quarter], times[-1] - times[half]
-    ends = times[last] - times[half], times[-1] - times[last]
-    within = period <= 0.0 or times[-1] - times[quarter] < period
-    return bool(within and lately < _QUICKER * before and ends[1] < _SHRINKS * ends[0])
+    n, begin = len(trajectory), trajectory.begin[0]
+    times = np.concatenate([[begin], trajectory.cycles * period + trajectory.times])
+    first, early, now = (
+        float(times[stop] - times[start]) / (stop - start)
+        for start, stop in ((0, n // 1000), (n // 100, n // 50), (3 * n // 4, n))
+    )
+    within = period <= 0.0 or times[-1] - times[n // 2] < _FEW * period
+    return bool(within and now < _FASTER * first and now < _STILL_FASTER * early)
 
 
 def without_an_end(trajectory: Trajectory) -> str:
     """Return what is said of a solution that switches, or strikes, without an end at a place that moves."""
-    met = sorted({surface for _, surface in trajectory.itinerary_from(-len(trajectory) // 4)})
+    from contfric.models.deriving.phases import KEY  # which takes sympy
+
+    lately = {surface for _, surface in trajectory.itinerary_from(-len(trajectory) // 4)}
+    met = sorted(lately - {KEY})
     where = " and ".join(f"'{name}'" for name in met)
     near = _place(trajectory.model, trajectory.states[-1])
     if any(reset.surface in met for reset in trajectory.model.resets):

@@ -1,4 +1,4 @@
-"""States and times of an orbit that are far from 1, at which orbits and events are told apart badly."""
+"""Warnings of orbits that are found: far from 1 in size, or on both sides of an event at once."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ _log = logging.getLogger(__name__)
 _FAR = 100.0
 #: Samples of an orbit whose states vanish at its joints: a tenth of its size is enough to know.
 _SAMPLES = 40
+#: Segments shorter than this, relative to the orbit, have no duration.
+_AT_ONCE = 1e-11
 
 
 def warn_of_sizes(orbit: Orbit) -> None:
@@ -32,4 +34,26 @@ def warn_of_sizes(orbit: Orbit) -> None:
             "the model",
             orbit.model.name,
             " and ".join(far),
+        )
+
+
+def warn_of_hits_together(orbit: Orbit) -> None:
+    """Log a warning where an orbit meets two surfaces at once: its multipliers are those of one order.
+
+    That is so at any parameters of a locked loop, whose detector sees both edges at the same time: solutions
+    near it meet them in one order or in the other.
+    """
+    model, itinerary = orbit.model, orbit.itinerary
+    resting = {own.mode for own in model.chatters}
+    for k, (mode, surface) in enumerate(itinerary):
+        if mode in resting or orbit.durations[k] > _AT_ONCE * orbit.period:
+            continue
+        _log.warning(
+            "the orbit of '%s' meets '%s' and '%s' at once: its segment in '%s' has no duration. Its "
+            "multipliers and its branch are those of solutions that meet them in this order; others may be "
+            "stable or not by other multipliers",
+            model.name,
+            itinerary[k - 1][1],
+            surface,
+            mode,
         )
