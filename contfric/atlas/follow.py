@@ -24,7 +24,7 @@ from contfric.atlas.leaving.families import (
     meets,
     solved_next_to,
 )
-from contfric.atlas.leaving.faults import fault_of, fault_of_itinerary
+from contfric.atlas.leaving.faults import fault_of, fault_of_itinerary, slips_to_one_side
 from contfric.atlas.leaving.folds import follow_arms
 from contfric.atlas.leaving.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.leaving.short_branches import follow_short
@@ -144,6 +144,8 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
             return
     if not jumps:  # else motions near the event are not near what follows it
         _follow_flow(state, event)
+    elif len(event.branches) == 1 and slips_to_one_side(orbit, event.proposals):
+        event.final = EndReason.SHAKEDOWN
 
 
 def _start_of(candidate: Candidate) -> tuple[object, ...]:
