@@ -10,22 +10,25 @@ A candidate is accepted when it is solved, and admissible beyond the event in on
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from itertools import chain
 
 from contfric.atlas.collect import NOT_ASKED_FOR, Event
 from contfric.atlas.exploration import Exploration
 from contfric.atlas.leaving.crossings import follow_crossing, whole_branch
 from contfric.atlas.leaving.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.leaving.families import (
-    SHARES,
     follow_beside_family,
     follow_family_at,
     meets,
     solved_next_to,
 )
-from contfric.atlas.leaving.faults import fault_of, fault_of_itinerary, slips_to_one_side
+from contfric.atlas.leaving.faults import (
+    STANDS_STILL,
+    fault_of,
+    fault_of_itinerary,
+    slips_to_one_side,
+)
 from contfric.atlas.leaving.folds import follow_arms
+from contfric.atlas.leaving.from_flow import follow_flow, meeting_next_to
 from contfric.atlas.leaving.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.leaving.short_branches import follow_short
 from contfric.atlas.leaving.splitting import follow_split
@@ -36,8 +39,7 @@ from contfric.atlas.leaving.trace_away import (
     may_have_passed,
     settings_for,
 )
-from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, on_branch, same_kind
-from contfric.bvp.conserved import conserved
+from contfric.atlas.matching import SAME_SOLUTION, inner_orbit, same_kind
 from contfric.bvp.system import Itinerary
 from contfric.continuation.branch import Branch
 from contfric.continuation.families.continuum import in_continuum
@@ -46,15 +48,11 @@ from contfric.continuation.singular_points.crossing import LOCATED, crossing_nea
 from contfric.events.accumulating import accumulates
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Decision, End, EndReason, Kind
 from contfric.events.incident.candidates import Candidate, sequences_of
-from contfric.events.incident.from_simulation import solutions_near
 from contfric.events.incident.incident import incident_forms, kinds_between
 from contfric.events.incident.partial_touches import partial_touches
 from contfric.events.local.jumps import nothing_jumps
 from contfric.orbit.canonical.repetition import shortest
-from contfric.orbit.itinerary.one_way import only_grows
 from contfric.orbit.orbit import Orbit
-from contfric.signature import canonical_itinerary
-from contfric.signature.walks import show
 
 #: The same for an event that is located to the root of rounding only.
 _NOWHERE_ROUGHLY = 1e-3
@@ -97,7 +95,7 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    accepted = jumps = False
+    accepted, jumps, most = False, False, 0
     orbit = event.bifurcation.orbit
     chatters = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
     if chatters or accumulates(event.bifurcation):
@@ -118,7 +116,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     for candidate in partial_touches(event.bifurcation, active, state.max_periods, state.copies):
         _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
-        incident = incident_forms(event.bifurcation, wide)
+        incident = incident_forms(event.bifurcation, wide, event.members)
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
@@ -143,7 +141,10 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it
-        _follow_flow(state, event)
+        if follow_flow(state, event) and most > shortest(orbit).periods:
+            state.waiting.appendleft(
+                event
+            )  # its solution has more forms now, which may follow each other
     elif len(event.branches) == 1 and slips_to_one_side(orbit, event.proposals):
         event.final = EndReason.SHAKEDOWN
 
@@ -155,78 +156,6 @@ def _start_of(candidate: Candidate) -> tuple[object, ...]:
     system = orbit.system
     moves = b"" if away is None else away.tobytes()
     return system.itinerary, system.periods, system.half, orbit.joints.tobytes(), moves
-
-
-def _follow_flow(state: Exploration, event: Event) -> None:
-    """Try the itineraries that solutions near an event follow."""
-    orbit, settings = event.bifurcation.orbit, state.settings
-    if orbit.system.holds:
-        return
-    active = orbit.model.index_of(settings.parameter)
-    shifts = tuple((active, share * settings.width) for share in SHARES)
-    reason = "the itinerary that the flow follows near the event"
-    refused: dict[Itinerary, str] = {}
-    done: set[Itinerary] = set()
-    creeps: set[Itinerary] = set()
-    asked: list[Branch] = []
-    whole = orbit.as_whole()
-    halves = solutions_near(whole, shifts, half=True) if orbit.symmetric else ()
-    for found in chain(solutions_near(whole, shifts), halves):
-        guess = replace(found, vector=orbit.vector)
-        itinerary = canonical_itinerary(guess.itinerary, orbit.model)
-        if itinerary in done:
-            continue
-        if only_grows(orbit.model, guess.itinerary):  # on its way to another orbit
-            creeps.add(itinerary)
-            refused.setdefault(itinerary, f"no periodic solution is {show(guess.itinerary)}")
-            continue
-        branch, ends = _meeting(state, guess, event, asked)
-        if branch is None:
-            refused.setdefault(itinerary, f"no orbit of {show(guess.itinerary)} meets the event")
-            continue
-        done.add(itinerary)
-        state.take(event, reason, branch, ends)
-    for itinerary in (w for w in refused if w not in done):
-        state.judge(event, reason, Decision.REFUSED, why=refused[itinerary])
-    # with an offset that is conserved nothing else goes on from here: other walks lead to orbits elsewhere,
-    # and those that stick all along are the continuum at which this begins, each with its own offset
-    others = refused.keys() - creeps
-    alone = len(orbit.system.layout.conserved) > 0 or all(
-        len(conserved(orbit.model, itinerary)) for itinerary in others
-    )
-    if creeps and alone and not done and len(event.branches) == 1:
-        event.final = EndReason.SHAKEDOWN
-
-
-def _meeting(
-    state: Exploration, orbit: Orbit, event: Event, asked: list[Branch]
-) -> tuple[Branch | None, list[End]]:
-    """Return the branch next to an orbit that ends at an event, and those ends; others were ``asked``.
-
-    A branch between an event and a doubling next to it may be very short. At a larger distance another branch
-    is found; so smaller distances are tried. Solutions near several events may follow the same itinerary,
-    which ends at one of them: what was traced is not traced again.
-    """
-    for near in solved_next_to(orbit, state.settings, guessed=True):
-        if any(_passes(branch, near) for branch in asked):
-            continue
-        traced = (*state.branches, *state.elsewhere)
-        branch = next((b for b in traced if _passes(b, near)), None)
-        if branch is None:
-            branch = whole_branch(near, state.settings)
-            if branch is None:
-                continue
-            state.elsewhere.append(branch)
-        ends = [end for end in branch.ends if meets(end, event, state.settings)]
-        if ends and not fault_of(branch, state.settings.width):
-            return branch, ends
-        asked.append(branch)
-    return None, []
-
-
-def _passes(branch: Branch, orbit: Orbit) -> bool:
-    """Tell whether a branch passes an orbit; a symmetric one, which comes whole, is followed on its half."""
-    return on_branch(orbit.as_half() if branch.system.half else orbit, branch)
 
 
 def _judge(state: Exploration, event: Event, candidate: Candidate) -> bool:
@@ -272,6 +201,11 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
     fault = fault_of(branch, state.settings.width)
+    if fault == STANDS_STILL:  # a line of such solutions leaves the event, too
+        other, ends = meeting_next_to(state, candidate.orbit, event, [])
+        if other is not None:
+            state.take(event, candidate.reason, other, ends)
+            return True
     if fault is None and _has_no_width(branch, event, state.settings):
         fault = "it begins and ends at the event, without any width"
     if fault is None and (found := state.known(inner_orbit(branch))) is not None:

@@ -19,6 +19,8 @@ from contfric.orbit.orbit import Orbit
 
 #: Why an itinerary is refused in which a mode can only last for no time.
 ONLY_GROWS = "something only grows along it, as a slider's offset that slips to one side: it cannot come back"
+#: Why one is refused along which a slide stands in its equilibrium: how long is free, so that it is a line.
+STANDS_STILL = "a slide of it goes nowhere: the solution of another itinerary, that rests"
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
 #: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
@@ -194,7 +196,7 @@ _FAULTS = (
         _never_lasts,
         "a segment of it has no length anywhere: the solution of another itinerary, that touches a surface",
     ),
-    (_stands, "a slide of it goes nowhere: the solution of another itinerary, that rests"),
+    (_stands, STANDS_STILL),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),
