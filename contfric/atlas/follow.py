@@ -22,8 +22,14 @@ from contfric.atlas.leaving.families import (
     meets,
     solved_next_to,
 )
-from contfric.atlas.leaving.faults import fault_of, fault_of_itinerary
+from contfric.atlas.leaving.faults import (
+    STANDS_STILL,
+    fault_of,
+    fault_of_itinerary,
+    slips_to_one_side,
+)
 from contfric.atlas.leaving.folds import follow_arms
+from contfric.atlas.leaving.from_flow import follow_flow, meeting_next_to
 from contfric.atlas.leaving.many_contacts import GOES_ON, composes, goes_on, in_order
 from contfric.atlas.leaving.short_branches import follow_short
 from contfric.atlas.leaving.splitting import follow_split
@@ -90,7 +96,7 @@ def follow(state: Exploration, event: Event) -> None:
 
 
 def _follow_sliding(state: Exploration, event: Event) -> None:
-    accepted = jumps = False
+    accepted, jumps, most = False, False, 0
     orbit = event.bifurcation.orbit
     chatters = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
     if chatters or accumulates(event.bifurcation):
@@ -111,7 +117,7 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
     for candidate in partial_touches(event.bifurcation, active, state.max_periods, state.copies):
         _judge(state, event, candidate)  # what crosses nothing is looked for below
     for wide in ((False,) if once else (False, True)) if edits else ():
-        incident = incident_forms(event.bifurcation, wide)
+        incident = incident_forms(event.bifurcation, wide, event.members)
         state.raise_copies(shortest(orbit).periods // incident.unit.periods)
         most = min(state.max_periods, state.copies * incident.unit.periods)
         proposed: Iterable[Candidate] = sequences_of(incident, active, most, state.bridges)
@@ -136,7 +142,11 @@ def _follow_sliding(state: Exploration, event: Event) -> None:
         if accepted or follow_split(state, event):
             return
     if not jumps:  # else motions near the event are not near what follows it
-        follow_flow(state, event)
+        if follow_flow(state, event) and most > shortest(orbit).periods:
+            # its solution has more forms now, which may follow each other
+            state.waiting.appendleft(event)
+    elif len(event.branches) == 1 and slips_to_one_side(orbit, event.proposals):
+        event.final = EndReason.SHAKEDOWN
 
 
 def _start_of(candidate: Candidate) -> tuple[object, ...]:
@@ -191,6 +201,11 @@ def _try(state: Exploration, event: Event, candidate: Candidate) -> bool:
         own = settings_for(candidate.orbit, state.settings)
         branch = leave_singular(state, candidate.orbit, event, own) or branch
     fault = fault_of(branch, state.settings.width)
+    if fault == STANDS_STILL:  # a line of such solutions leaves the event, too
+        other, ends = meeting_next_to(state, candidate.orbit, event, [])
+        if other is not None:
+            state.take(event, candidate.reason, other, ends)
+            return True
     if fault is None and _has_no_width(branch, event, state.settings):
         fault = "it begins and ends at the event, without any width"
     if fault is None and (found := state.known(inner_orbit(branch))) is not None:

@@ -599,3 +599,28 @@ def test_an_event_at_which_the_pin_of_a_hold_moves_has_one_name(case: int) -> No
     explored = cf.explore(orbit, found.vary, (0.0, 0.05))
     assert len(explored.branches) >= 7
     assert explored.verify(restarts=3).passed
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_a_slide_that_stands_at_an_event_hides_no_branch(seed: int) -> None:
+    """Where a slide has shrunk to a stop without acceleration, how long it stands there is free.
+
+    Along that line nothing changes; what is traced may follow it, and the branch leaves in another direction.
+    What rests there has no outcome that leads to its form, and over two periods both follow each other.
+    """
+    draw = np.random.default_rng([57, seed])
+    about = {
+        "k": 5.05,
+        "b": 0.735,
+        "m": 0.912,
+        "Ff": 0.6547,
+        "omega": 1.0864,
+        "a": 0.917,
+        "e": 0.7775,
+    }
+    params = {name: value * draw.uniform(0.99, 1.01) for name, value in about.items()}
+    orbit = cf.find_orbit("impact-friction", params, state=[-0.08, 0.0], time=-1.5, longest=1000)
+    explored = cf.explore(orbit, "k", (4.03, 6.95), max_periods=2)
+    assert sorted(branch.system.periods for branch in explored.branches) == [1, 1, 1, 2]
+    assert not explored.loose_ends
+    assert explored.verify().passed

@@ -388,3 +388,28 @@ def test_a_datum_off_the_centre_is_kept_until_its_contact_creeps() -> None:
     assert {end.reason.name for end in branch.ends} == {"RANGE", "SHAKEDOWN"}
     for k in range(0, len(branch), 10):
         assert branch[k].joints[:, 6] == pytest.approx(0.1, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_with_a_higher_static_limit_a_stuck_contact_slips_by_some_length_at_once(seed: int) -> None:
+    """A hold there could not be periodic, whatever its length: the branch ends, and says why.
+
+    Beyond it the simulated mass leaves its position, and sticks again at another one.
+    """
+    draw = np.random.default_rng([61, seed])
+    about = {"W": 0.5086, "F": 0.3698, "k": 1.1966, "c": 0.025, "S": 0.2168, "S0": 0.29896}
+    params = {name: value * draw.uniform(0.97, 1.03) for name, value in about.items()}
+    orbit = cf.find_orbit("braced-chain", params, longest=1000)
+    diagram = cf.explore(orbit, "W", (0.97 * params["W"], 1.12 * params["W"]), max_periods=1)
+    assert not diagram.loose_ends
+    (end,) = (e for e in diagram.branches[0].ends if e.reason.name == "SHAKEDOWN")
+    assert end.bifurcation is not None
+    last, before = end.bifurcation.orbit, diagram.branches[0][-10]
+    beyond = last.params | {"W": last.params["W"] + 1e-4}
+    kept, *_ = np.flatnonzero(np.ptp(last.joints[:, 1:], axis=0) < 1e-12)  # its velocity is, too
+    for begun, values in ((before, before.params), (last, beyond)):
+        time, *state = begun.joints[0]
+        run = cf.simulate("braced-chain", values, state=state, time=time, periods=300)
+        position = run.states[:, kept]
+        assert (abs(position[-1] - position[0]) > 1e-3) == (begun is last)
+        assert np.ptp(position[-20:]) < 1e-12

@@ -9,9 +9,10 @@ import pytest
 
 import contfric as cf
 from contfric.atlas.diagram import Diagram
+from contfric.atlas.matching import identity, identity_of
 from contfric.bvp.margins import Margin
 from contfric.continuation.branch import Branch
-from contfric.events.bifurcation import Kind
+from contfric.events.bifurcation import TERMINAL, Kind
 from contfric.events.incident.conditions import Relation, possible, relation_of
 from contfric.events.incident.incident import incident_forms, vanishing
 from contfric.events.local.gradients import gradient_of
@@ -25,6 +26,8 @@ WIDTH = 0.06
 STOPS = {"Omega": 0.224148285, "S": 0.40331387, "S0": 0.88561545, "h": 0.276719682, "zeta": 1e-7}
 #: In diagrams near this one, in zeta, the strip between the limits is narrow: holds cross it in no time.
 NARROW = {"Omega": 0.10107, "S": 0.088966, "h": 0.12774, "zeta": 0.00155}
+#: In diagrams near this one, in h, holds begin at the first of two maxima that are equal for all parameters.
+EQUAL = {"Omega": 0.160638, "S": 0.0236764, "S0": 0.147835, "h": -0.193088, "zeta": 0.0}
 #: A rate this large at an exit is the root of what an event is located to.
 ROOT = 1e-8
 
@@ -65,6 +68,32 @@ def test_hold_that_cannot_be_left_inside() -> None:
             assert sorted(ahead) == [False, True]
             asked += 1
     assert asked
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_load_with_equal_maxima(seed: int) -> None:
+    """The second maximum is at the limit all along such a bridge: its margin is rounding and says nothing."""
+    rng = np.random.default_rng([9, seed])
+    moved = {name: value * (1.0 + rng.uniform(-0.001, 0.001)) for name, value in EQUAL.items()}
+    orbit = cf.find_orbit("coulomb", moved, longest=1000)
+    found = cf.explore(orbit, "h", (-0.252, -0.128))
+    active, asked = found.model.index_of("h"), 0
+    for event in found.events:
+        if event.bifurcation.kind not in TERMINAL:
+            continue
+        incident, value = incident_forms(event.bifurcation), event.bifurcation.params["h"]
+        for form in incident.forms:
+            relation = relation_of(form, active, incident.least)
+            own = [
+                b
+                for b in (found.branches[i] for i in event.branches)
+                if form.orbit.system.half == b.system.half
+            ]
+            for branch in (b for b in own if identity_of(b) == identity(form.orbit)):
+                assert relation is not None
+                assert possible([relation], [(0,)])[0][int(branch.values[len(branch) // 2] > value)]
+                asked += any(hold.pin is None for hold in branch.system.holds)
+    assert asked > 5
 
 
 def test_exit_that_is_tangential_to_rounding() -> None:

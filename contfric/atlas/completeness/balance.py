@@ -293,10 +293,15 @@ def _beside(
         told = far & (away > _BLURRED * (1.0 + float(np.abs(branch[0].joints[:, 1:]).max())))
         k = int(min(np.flatnonzero(told if np.any(told) else far), key=away.__getitem__))
         return int(np.sign(branch.values[k] - value)), branch[k]
-    if following is None or is_short(branch):
+    if following is None:
         return None
-    # in the middle of what is beyond the slack, where the parameter goes on to the next event
     onward = following.params[branch.parameter] - value
+    if is_short(branch):  # nothing is solved on it: a point is on the side on which the branch ends
+        inner = np.flatnonzero(between)
+        if abs(onward) <= slack or not inner.size:
+            return None
+        return int(np.sign(onward)), branch[int(inner[inner.size // 2])]
+    # in the middle of what is beyond the slack, where the parameter goes on to the next event
     share = 0.5 * (1.0 + slack / abs(onward)) if abs(onward) > slack else 0.5
     solved = _solved_at(branch, position + share * (reach - position), width)
     gap = 0.0 if solved is None else solved.params[branch.parameter] - value

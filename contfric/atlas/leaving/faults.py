@@ -11,6 +11,7 @@ from contfric.base.arrays import FloatArray
 from contfric.continuation.accuracy.moved_by_errors import duration_error
 from contfric.continuation.branch import Branch
 from contfric.continuation.located_event import ROUGH
+from contfric.events.bifurcation import Decision, Proposal
 from contfric.events.outcomes.standing_slides import STANDS, goes_nowhere
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.itinerary.one_way import only_grows
@@ -18,6 +19,8 @@ from contfric.orbit.orbit import Orbit
 
 #: Why an itinerary is refused in which a mode can only last for no time.
 ONLY_GROWS = "something only grows along it, as a slider's offset that slips to one side: it cannot come back"
+#: Why one is refused along which a slide stands in its equilibrium: how long is free, so that it is a line.
+STANDS_STILL = "a slide of it goes nowhere: the solution of another itinerary, that rests"
 #: A hold shorter than this share of the arclength is rounding: on a bridge joints move as its length does, by
 #: 300 times it where one of four periods is held next to a doubling.
 _NO_TIME = 1e-4
@@ -40,6 +43,16 @@ _ASKED = (0.25, 0.5, 0.75)
 def fault_of_itinerary(orbit: Orbit) -> str | None:
     """Return what is wrong with the itinerary of an orbit, whatever its branch is; None if nothing is."""
     return ONLY_GROWS if only_grows(orbit.model, orbit.as_whole().itinerary) else None
+
+
+def slips_to_one_side(orbit: Orbit, proposals: Iterable[Proposal]) -> bool:
+    """Tell whether a contact that an orbit keeps stuck slips to one side only, whatever follows an event.
+
+    With a static limit above the kinetic one it slips by some length at once. It sticks at another position
+    after that: the orbits there are others, of a continuum, and none of them meets the event.
+    """
+    refused = [p.why for p in proposals if p.verdict is Decision.REFUSED]
+    return len(orbit.system.layout.conserved) > 0 and set(refused) == {ONLY_GROWS}
 
 
 def fault_of(branch: Branch, width: float) -> str | None:
@@ -183,7 +196,7 @@ _FAULTS = (
         _never_lasts,
         "a segment of it has no length anywhere: the solution of another itinerary, that touches a surface",
     ),
-    (_stands, "a slide of it goes nowhere: the solution of another itinerary, that rests"),
+    (_stands, STANDS_STILL),
     (_is_symmetric, "its orbits are symmetric: it is another branch, which is solved on its half"),
     (_violates, "it violates a condition all along, by little more than rounding"),
     (_repeats, "its orbits are shorter ones, run through several times"),

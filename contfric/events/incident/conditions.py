@@ -131,10 +131,15 @@ def relation_of(form: Form, active: int, least: float) -> Relation | None:
                 free[k] *= np.copysign(1.0, along[k]) if not signed[k] else 1.0
                 signed[k] = 1.0
             continue
-        row = on_inner @ moves
-        row[:m] += gradient[0]
-        row[m : 2 * m] += gradient[-1] @ close
-        row[2 * m] += slope + gradient[-1] @ closing(orbit, active)
+        row, direct = on_inner @ moves, np.zeros(2 * m + 1)
+        direct[:m] = gradient[0]
+        direct[m : 2 * m] += gradient[-1] @ close
+        direct[2 * m] = slope + gradient[-1] @ closing(orbit, active)
+        terms = np.abs(on_inner) @ np.abs(moves) + np.abs(direct)
+        row += direct
+        scale = np.concatenate([own, own, [abs(orbit.vector[active]) or 1.0]])
+        if np.abs(row * scale).max() <= _NULL * (terms * scale).max():
+            continue  # it is zero all along: what is left of it is rounding
         margins.append(np.concatenate([row, np.zeros(len(free))]))
     effects = []
     for k, direction in enumerate(free):

@@ -18,7 +18,8 @@ An orbit at the event is a cyclic sequence of forms (:mod:`contfric.events.incid
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -117,13 +118,17 @@ class Incident:
     wide: bool = False
 
 
-def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
+def incident_forms(
+    bifurcation: Bifurcation, wide: bool = False, others: Iterable[Bifurcation] = ()
+) -> Incident:
     """Return all forms of the solution at a sliding event.
 
     Parameters
     ----------
     wide : bool
         Whether margins that nearly vanish count: where the location is known to half of the digits.
+    others : iterable of Bifurcation
+        The event as other branches have it: an outcome may lead from their forms to this one and not back.
     """
     orbit = bifurcation.orbit.as_whole()
     least = _NEARLY if wide or bifurcation.accuracy > ACCURACY else _VANISHES
@@ -141,6 +146,10 @@ def incident_forms(bifurcation: Bifurcation, wide: bool = False) -> Incident:
     if cut is None:
         kinds = [(location, bifurcation.kind) for location in locations]
         collection.edit(orbit, arrives, np.zeros(len(orbit.itinerary)), "", kinds)
+    for other in others:
+        arrived = altered(other.orbit.as_whole(), vector=orbit.vector)
+        with suppress(NotationError):  # its image in a symmetry is cut elsewhere
+            collection.take(arrived, np.zeros(len(arrived.itinerary)), "")
     collection.close()
     return Incident(
         unit,
