@@ -145,7 +145,7 @@ def test_many_turns_next_to_a_fold_are_those_of_one(seed: int) -> None:
     folds = [arms for b in _folds(diagram) if not (arms := arms_at(b.orbit)).unit.half]
     assert folds
     parts: list[int] = []
-    # nearer than the root of rounding whether both arms are solved is luck: distances are tried until they are
+    # nearer than the root of rounding it is luck whether both arms are solved: several distances are tried
     for distance, arms in product(10.0 ** rng.uniform(-7.5, -6.2, 9), folds):
         if parts and arms is folds[0]:
             break
