@@ -15,7 +15,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from contfric.base.arrays import FloatArray
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.ends.at_events import (
@@ -313,25 +315,58 @@ def ends_at_corner(orbit: Orbit, side: Side, settings: Settings, fresh: int) -> 
     rows, last = side.rows, side.last
     first = max(0, last - fresh)
     steps = rows.arc[first + 1 : last + 1] - rows.arc[first:last]
-    short = (steps < _STEP) & (rows.arc[first:last] - side.first.arc > _START)
-    if not short.any():
+    started = rows.arc[first:last] - side.first.arc > _START
+    short, touches = (steps < _STEP) & started, _touches(side, orbit, first) & started
+    if not (short | touches).any():
         return False
-    z, w = rows.tangents[first : last + 1], rows.directions[first : last + 1, 0]
-    along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * settings.scale
-    for k in first + np.flatnonzero(short & (along < np.cos(_TURN))):
+    turns = _turns(side, first, settings.scale) > _TURN
+    for k in first + np.flatnonzero((short & turns) | touches):
         tip = rows.point(int(k))
         found = met_together(orbit, tip, settings)
         if found is None or not _has_fallen(side, orbit, int(k), found):
             continue
-        # it lies within the step over which the branch turns, on either of the two ways
-        size = orbit.model.size_of(orbit.model.index_of(settings.parameter), tip.value)
-        step, change = float(steps[k - first]), float(rows.w[k + 1, 0] - tip.value)
-        change = max(abs(change), step * abs(tip.slope)) + step**2 * size
+        if touches[k - first]:
+            change = _left_over(side, orbit, int(k), found)
+        else:  # it lies within the step over which the branch turns, on either of the two ways
+            size = orbit.model.size_of(orbit.model.index_of(settings.parameter), tip.value)
+            step, change = float(steps[k - first]), float(rows.w[k + 1, 0] - tip.value)
+            change = max(abs(change), step * abs(tip.slope)) + step**2 * size
         known = max(ROUGH, 2.0 * change / settings.width)
         side.rewind(int(k))
         side.end = End(EndReason[found.kind.name], bifurcation=replace(found, bound=known))
         return True
     return False
+
+
+def _turns(side: Side, first: int, scale: float) -> FloatArray:
+    """Return by how much (rad) a side turns over each of its steps from a row on."""
+    rows, last = side.rows, side.last
+    z, w = rows.tangents[first : last + 1], rows.directions[first : last + 1, 0]
+    along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * scale
+    return np.arccos(np.clip(along, -1.0, 1.0))
+
+
+def _touches(side: Side, orbit: Orbit, first: int) -> NDArray[np.bool_]:
+    """Tell for each step from a row on whether a margin is zero where it begins, and at no point next to it.
+
+    A point may lie at the very corner, by chance: steps on either side of it need not be short.
+    """
+    last, margins = side.last, side.rows.tests[:, : len(orbit.system.tests)]
+    touches = np.zeros(max(0, last - first), dtype=bool)
+    low = max(first, 1)
+    if low >= last:
+        return touches
+    here = margins[low:last]
+    near = _FALLEN * np.minimum(margins[low - 1 : last - 1], margins[low + 1 : last + 1])
+    touches[low - first :] = np.any(np.abs(here) < np.minimum(_LEFT, near), axis=1)
+    return touches
+
+
+def _left_over(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> float:
+    """Return by how much the parameter changes from a row to where its margin vanishes, with the square."""
+    rows, test = side.rows, orbit.system.tests.index(found.tests[0])
+    left = abs(float(rows.tests[k, test] / rows.tests[k - 1, test]))
+    return abs(float(rows.w[k, 0] - rows.w[k - 1, 0])) * left**0.5
 
 
 def _has_fallen(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> bool:

@@ -92,6 +92,10 @@ TERMINAL = frozenset({Kind.CS, Kind.SS, Kind.AS, Kind.GS})
 
 #: The solution at a located event is good to about 1e-10; asymmetry this small is not seen in a diagram.
 _SYMMETRIC = 1e-7
+#: Most that a solution may be off where its event is known roughly, and that is the root of how well (so far
+#: from symmetric are the two branches of a pitchfork, that far from it in the parameter): ``SAME_SOLUTION``
+#: of :mod:`contfric.atlas.matching`.
+_NEARLY_SYMMETRIC = 1e-4
 #: A solution this far from its mirror image is another one, however badly its parameter is known: events that
 #: are as far apart are two (``_APART`` of :mod:`contfric.atlas.matching`).
 _ASYMMETRIC = 0.05
@@ -246,7 +250,9 @@ class Bifurcation(MeasuredEvent):
             return False
         apart = self.outline.apart_from_image
         # accuracies cost: they are asked for last
-        return apart < _SYMMETRIC or (apart < _ASYMMETRIC and apart < self.accuracy)
+        if not _SYMMETRIC <= apart < _ASYMMETRIC:
+            return apart < _SYMMETRIC
+        return apart < max(self.accuracy, min(_NEARLY_SYMMETRIC, self.accuracy**0.5))
 
     @property
     def outline(self) -> Outline:

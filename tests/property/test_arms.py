@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 from math import comb
 
 import numpy as np
@@ -143,11 +144,12 @@ def test_many_turns_next_to_a_fold_are_those_of_one(seed: int) -> None:
     )
     folds = [arms for b in _folds(diagram) if not (arms := arms_at(b.orbit)).unit.half]
     assert folds
-    parts = []
-    for arms in folds:
-        near = arms.beside(
-            10.0 ** rng.uniform(-7.5, -6.2), settings_of(arms.fold, vary, bounds, None, False, 1000)
-        )
+    parts: list[int] = []
+    # nearer than the root of rounding it is luck whether both arms are solved: several distances are tried
+    for distance, arms in product(10.0 ** rng.uniform(-7.5, -6.2, 9), folds):
+        if parts and arms is folds[0]:
+            break
+        near = arms.beside(distance, settings_of(arms.fold, vary, bounds, None, False, 1000))
         for sequence in ((0, 0, 0, 1), (0, 0, 1, 1)) if near else ():
             part = undoubled_part(near.orbit(sequence), arms.fold.model.index_of(vary))
             parts += [] if part is None else [part.periods // arms.fold.periods]

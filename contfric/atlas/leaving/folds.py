@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from contfric.atlas.collect import Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving.crossings import whole_branch
 from contfric.atlas.leaving.trace_away import first_end, settings_for
 from contfric.continuation.assembly import assemble
 from contfric.continuation.half_branch import first_point
@@ -44,27 +43,17 @@ def follow_arms(state: Exploration, event: Event) -> bool:
             state.judge(event, f"orbits of {length} units", Decision.REFUSED, why=why)
             continue
         for sequence in necklaces(arms.letters, length):
-            exchanged = _rotated(tuple(arms.letters - 1 - letter for letter in sequence))
-            _try_arms(state, event, near, sequence, exchanged)
+            _try_arms(state, event, near, sequence)
     return True
 
 
-def _rotated(sequence: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the least rotation of a sequence."""
-    return min(sequence[k:] + sequence[:k] for k in range(len(sequence)))
-
-
 def _try_arms(
-    state: Exploration,
-    event: Event,
-    near: list[tuple[float, Arms]],
-    sequence: tuple[int, ...],
-    exchanged: tuple[int, ...],
+    state: Exploration, event: Event, near: list[tuple[float, Arms]], sequence: tuple[int, ...]
 ) -> None:
-    """Try one sequence; its curve goes on through the fold as the one with all arms exchanged.
+    """Try one sequence, as a branch that begins at the fold.
 
-    It is traced to one side of the fold where that is the same, or its image, or is known already: a branch
-    may end at the fold, or pass it, as its vertex is seen or not.
+    Its curve goes on through the fold as the one with all arms exchanged. Whether a trace ends at the fold or
+    passes it depends on whether its vertex is seen, and that next to it is rounding.
     """
     reason = _reason(near[0][1], sequence)
     for _, arms in near:
@@ -73,12 +62,6 @@ def _try_arms(
             continue
         if state.knows(event, reason, there):
             return
-        beyond = there if sequence == exchanged else arms.orbit(exchanged)
-        if beyond is not there and not (beyond.converged and state.known(beyond) is not None):
-            if (branch := whole_branch(there, state.settings)) is not None:
-                state.accept(event, reason, branch)
-                return
-            continue
         point = first_point(there, settings_for(there, state.settings))
         if point is not None:
             _add_one_sided(state, event, arms.at_fold(len(sequence)), point, reason)

@@ -45,6 +45,8 @@ _NOWHERE_ROUGHLY = 1e-3
 #: The first start near an event that is singular, in roots of rounding: states are known there to a share
 #: of 1e-5, and what happens nearer changes the parameter by rounding only (by the square of this).
 _KNOWN = 500.0
+#: Distance between two points, and how many times their arclength, at which they are on two curves.
+_ELSEWHERE, _LOST = 1e-3, 100.0
 #: One that gets this far has left it in the right one. A shorter one may have gone back the way that the
 #: start was near the event: a touch at the very end of a segment is located to the root of rounding.
 _SURELY_AWAY = 1e-4
@@ -250,6 +252,8 @@ def went_somewhere(side: Side, event: Event, settings: Settings) -> bool:
     A regular orbit may meet the next event at once: two stops of a nearly symmetric one reach a boundary one
     after the other. Both events are known then to less than what is between them.
     """
+    if _ends_elsewhere(side, settings):
+        return False
     there, end = event.bifurcation, side.end.bifurcation
     rough = there.accuracy > ACCURACY
     if side.length > (_NOWHERE_ROUGHLY if rough else _NOWHERE):
@@ -258,6 +262,20 @@ def went_somewhere(side: Side, event: Event, settings: Settings) -> bool:
         return False
     gap = abs(end.params[settings.parameter] - there.params[settings.parameter]) / settings.width
     return gap > there.accuracy + end.accuracy
+
+
+def _ends_elsewhere(side: Side, settings: Settings) -> bool:
+    """Tell whether the last point of a side is on another curve: far from the one before for their arclength.
+
+    Next to an event at which curves cross a point is off by rounding over the distance. A side that creeps
+    there, in steps as short as that, may be lost to any of them.
+    """
+    if side.last < 1:
+        return False
+    tip, before = side.tip, side.before_tip
+    square = float(np.sum((tip.joints - before.joints) ** 2)) / len(tip.joints)
+    apart = (square + (tip.value - before.value) ** 2 * settings.scale) ** 0.5
+    return bool(apart > max(_ELSEWHERE, _LOST * (tip.arc - before.arc)))
 
 
 def first_end(reason: EndReason, event: Event, side: Side, settings: Settings) -> End:

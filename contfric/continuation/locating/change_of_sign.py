@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from contfric.continuation.core.locate import Sought
 
 
-#: Cosine of an angle by which no tangent turns over a step: three times the most that is accepted.
-_TURNED = 0.5
+#: Cosine of an angle by which no tangent turns over a step: twice the most that is accepted.
+_TURNED = 0.76
 
 
 class _Trials(threading.local):
@@ -34,8 +34,9 @@ class _Trials(threading.local):
     def between(self, system: System, before: Point, after: Point, scale: float) -> PointRows:
         """Return the rows with both points, and nothing of an earlier location.
 
-        No step turns by as much as :data:`_TURNED`. The tangent of a point that does is rounding: a segment
-        has no length there. A cubic with it would leave the branch and turn back.
+        No step turns by as much as :data:`_TURNED`. A tangent by which one does is rounding: a segment has no
+        length there, or two curves cross. A cubic with it would leave the branch. It is the one that is
+        farther from the chord; in its place there is that of the parabola through both points.
         """
         if self.system is not system:
             self.rows, self.system = PointRows.empty(system, 4), system
@@ -43,11 +44,21 @@ class _Trials(threading.local):
         rows = self.rows
         rows.put(0, before)
         rows.put(1, after)
-        along = float(np.vdot(before.tangent, after.tangent)) / len(before.tangent)
-        if along + scale * before.slope * after.slope < _TURNED:
-            rows.tangents[1], rows.directions[1] = before.tangent, before.direction
+        length = after.arc - before.arc
+        if length != 0.0 and _along(before, after.tangent, after.direction, scale) < _TURNED:
+            joints, w = (after.joints - before.joints) / length, (after.w - before.w) / length
+            far = [_along(point, joints, w, scale) for point in (before, after)]
+            bad, good = (0, after) if far[0] < far[1] else (1, before)
+            rows.tangents[bad] = 2.0 * joints - good.tangent
+            rows.directions[bad] = 2.0 * w - good.direction
         rows.arc[2:], rows.tests[2:], rows.labels[2:], rows.mu[2:] = 0.0, 0.0, 0, 0.0
         return rows
+
+
+def _along(point: Point, tangent: FloatArray, w: FloatArray, scale: float) -> float:
+    """Return the product of the tangent of a point with another one: 1 along the same one."""
+    along = float(np.vdot(point.tangent, tangent)) / len(tangent)
+    return along + scale * float(point.direction @ w)
 
 
 _TRIALS = _Trials()

@@ -270,6 +270,8 @@ def _changes(step: Step, k: int) -> list[Located]:
         # where curves cross a trial may lie on another one
         if point.tests[: len(orbit.system.tests)].min(initial=0.0) < -_OUTSIDE:
             continue
+        if _jumps(step, k, point):
+            continue
         if vanishes and _stays(step, k, point):
             continue
         here = step.orbit_at(point)
@@ -277,6 +279,16 @@ def _changes(step: Step, k: int) -> list[Located]:
         b = bifurcation_at(Kind.T, here, point, point, point, settings, (test,))
         found.append((b, point))
     return found
+
+
+def _jumps(step: Step, k: int, point: Point) -> bool:
+    """Tell whether a label differs on two sides of a location only as trials there lie on two curves.
+
+    Where it changes along one curve what touches a surface there has no distance left to it.
+    """
+    of_label = len(step.orbit.system.tests) + k
+    left, *ends = (float(p.tests[of_label]) for p in (point, step.before, step.after))
+    return left > max(_OUTSIDE, _FALLEN * max(ends))
 
 
 def _stays_to_end(step: Step, k: int) -> bool:
