@@ -13,7 +13,6 @@ from collections.abc import Iterable
 
 from contfric.atlas.collect import NOT_ASKED_FOR, Event
 from contfric.atlas.exploration import Exploration
-from contfric.atlas.leaving.by_the_flow import follow_flow
 from contfric.atlas.leaving.crossings import follow_crossing, whole_branch
 from contfric.atlas.leaving.departures import NO_WIDTH, ends_at, follow_departure
 from contfric.atlas.leaving.families import (
