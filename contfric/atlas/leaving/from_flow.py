@@ -22,7 +22,6 @@ from contfric.orbit.orbit import Orbit
 from contfric.signature import canonical_itinerary
 from contfric.signature.walks import show
 
-
 #: Points to either side of an orbit next to an event, within which its branch ends there if it does: it comes
 #: after 4 to 30 of them. Those that do not were nine tenths of the time of a pendulum's diagram.
 _NEXT_TO_IT = 100

@@ -29,7 +29,7 @@ from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings
 from contfric.errors import NotationError
 from contfric.events.incident.unit import Form, Unit, form_of, pieces, unit_of
-from contfric.orbit.measured.joint_units import joint_units
+from contfric.orbit.canonical.joint_units import joint_units
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 

@@ -41,8 +41,8 @@ from contfric.events.incident.unit import Form
 from contfric.events.local.gradients import closing, gradient_of
 from contfric.events.local.jumps import nothing_jumps
 from contfric.events.outcomes.outcomes import NEARLY_NO_LENGTH
+from contfric.orbit.canonical.joint_units import joint_units
 from contfric.orbit.canonical.slides import time_unit
-from contfric.orbit.measured.joint_units import joint_units
 from contfric.orbit.orbit import Orbit
 from contfric.signature.holds import TOUCH, ends_rest, is_hold
 
