@@ -45,7 +45,7 @@ class Observable:
 
 @dataclass(frozen=True)
 class Surface:
-    """A level set of an observable; ``switching`` if motion is cut there, as the field changes.
+    """A level set of an observable; ``switching`` if solutions are cut there, as the field changes.
 
     A switching surface has another mode on each side. Where their fields agree everywhere it is a section,
     which is not switching.
@@ -57,7 +57,7 @@ class Surface:
     switching: bool = False
 
 
-#: Sides are the bits of one signed number of 64. Surfaces behind these, which come as solutions visit their
+#: Sides are the bits of one signed number of 64. Surfaces after these, which come as solutions visit their
 #: modes, have none: no rule asks for their sides, and nothing lies on them.
 MOST_SURFACES = 62
 
@@ -67,7 +67,7 @@ class Mode:
     """One smooth vector field.
 
     ``rank`` is the number of independent directions that survive it (a stick keeps one of two:
-    one multiplier becomes exactly zero); ``sliding`` says that motion stays on a surface; ``derived``
+    one multiplier becomes exactly zero); ``sliding`` says that solutions stay on a surface; ``derived``
     that nobody wrote the mode: it follows from the fields on both sides of its surface.
     """
 
@@ -139,7 +139,7 @@ def across(
 ) -> list[Domain]:
     """Return the domains on the other side of a surface that an image lies on, in modes that hold on both.
 
-    The surface is a label there: motion may go on to either side.
+    The surface is a label there: solutions may go on to either side.
     """
     turned = [
         (d.own_mode, {**d.signs, surface: -d.signs[surface]})
@@ -162,7 +162,7 @@ class Departure:
     leaves: Mapping[str, int]
 
 
-#: The side of a surface to which some images leave it, others to the other one: a kick against the motion.
+#: The side of a surface to which some images leave it, others to the other one: a kick against the velocity.
 EITHER = 2
 
 
@@ -179,7 +179,7 @@ class Reset:
     formula : the map, for the reader
     changes : observables whose values the map changes; the domains that can follow are those that differ in
         the signs of these
-    lands : surfaces that every image lies on, and the side to which motion leaves them. For the reset's own
+    lands : surfaces that every image lies on, and the side to which solutions leave them. For the reset's own
         surface that is +1 where it goes back (a wall), -1 where it passes. 0 where it goes on sliding there,
         :data:`EITHER` where the domain after it tells the side
     ways : domains in which images leave the surfaces that they lie on; empty if their sides are known

@@ -63,7 +63,7 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
     from contfric.simulation import march as trajectory
 
     count = len(task.states)
-    labels, ends, followed = np.zeros((3, count), dtype=np.int64)
+    labels, ends = np.zeros((2, count), dtype=np.int64)
     flag = new_stop() if stop is None else stop
     arguments = (
         task.model.flow.following(),
@@ -78,7 +78,6 @@ def compute_basin_tile(task: BasinTile, stop: IntArray | None = None) -> BasinRo
         flag,
         labels,
         ends,
-        followed,
     )
     until_interrupted(capture, arguments, flag if stop is None else None)
     motions = np.full(count, Motion.PERIODIC.code, dtype=np.uint8)

@@ -65,7 +65,6 @@ def caught(targets, key, t, y, period, timeless):  # type: ignore[no-untyped-def
         indices,
         indices,
         indices,
-        indices,
     )
 )
 def capture(  # type: ignore[no-untyped-def]
@@ -81,7 +80,6 @@ def capture(  # type: ignore[no-untyped-def]
     stop,
     labels,
     ends,
-    followed,
 ):
     """Follow solutions from ``states`` at ``time`` until an orbit catches them, or the periods are over.
 
@@ -89,8 +87,8 @@ def capture(  # type: ignore[no-untyped-def]
     ----------
     ticks : time from tick to tick of a clock, 0 of a model without
     stop : another thread writes a 1 to it when nobody waits for the result any more
-    labels, ends, followed : orbit, -1 if none; how a solution without one ended, as simulations do,
-        ``NO_START`` or ``NOT_YET``; periods followed; shape (k,)
+    labels, ends : orbit, -1 if none; how a solution without one ended, as simulations do, ``NO_START`` or
+        ``NOT_YET``; shape (k,)
     """
     n, surfaces = states.shape[1], tables.observables.shape[0]
     transit, workspace = new_transit(n), state_workspace(n)
@@ -123,4 +121,3 @@ def capture(  # type: ignore[no-untyped-def]
             if label >= 0:
                 labels[cell] = label
                 break
-        followed[cell] = cycle
