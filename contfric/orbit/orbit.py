@@ -166,10 +166,7 @@ class Orbit(MeasuredOrbit):
     @cached_property
     def durations(self) -> FloatArray:
         """How long each segment of the whole orbit lasts, shape (segments,)."""
-        times = self.cycle[:, 0]
-        lasts = np.empty(len(times))
-        lasts[:-1], lasts[-1] = times[1:] - times[:-1], times[0] + self.period - times[-1]
-        return lasts
+        return np.asarray(self.ends[:, 0] - self.cycle[:, 0])
 
     def as_whole(self) -> Orbit:
         """Return the same orbit as a problem on its whole cycle."""
