@@ -22,9 +22,9 @@ from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.ends.at_events import (
     AT_END,
+    end_at_resonance,
     endless,
     grows,
-    has_grown,
     lost_in_end,
     never_leaves,
     only_lengthens,
@@ -283,8 +283,8 @@ def _advance(orbit: Orbit, side: Side, settings: Settings, step: float) -> tuple
             end_stalled(orbit, side, settings)
         if side.end.reason in (EndReason.STEP, EndReason.BROKEN) and slows_down(side, settings):
             side.end = End(EndReason.PERIOD)
-        elif side.end.reason is EndReason.STEP and has_grown(side, settings):
-            side.end = End(EndReason.UNBOUNDED)
+        elif side.end.reason is EndReason.STEP:
+            side.end = end_at_resonance(side, settings) or side.end
         return True, step
     if why == kernels.FULL and grows(side, settings):
         side.end = End(EndReason.UNBOUNDED)

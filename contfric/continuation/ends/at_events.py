@@ -55,7 +55,13 @@ _SAME = 1e-4
 #: this large and grow by this factor, comes to a resonance.
 _AT_RESONANCE, _LARGE, _GROWS = 1e-7, 1e3, 1.1
 #: States of a side that stalls at a resonance, and the share of the range over which they have doubled.
-_HUGE, _STANDS = 1e4, 1e-5
+_HUGE, _STANDS = 1e4, 1e-4
+#: By how much less the parameter moves from doubling to doubling, if nothing bounds the amplitude: 1/2.
+_HALVES = 0.65
+_AT_PEAK = (
+    "the peak of a resonance with little damping: orbits as large as {size:.2g} are determined to too few "
+    "digits to go on. Add damping, or start on the other side"
+)
 
 
 def is_point(orbit: Orbit) -> bool:
@@ -308,13 +314,24 @@ def grows(side: Side, settings: Settings) -> bool:
     return now > _LARGE and now > _GROWS * before
 
 
-def has_grown(side: Side, settings: Settings) -> bool:
-    """Tell whether a side stalls at a resonance: large, and over its last doubling at one value."""
+def end_at_resonance(side: Side, settings: Settings) -> End | None:
+    """Return the end of a side that stalls at a resonance: large, and over its last doubling at one value.
+
+    Without damping the distance of the parameter from the resonance halves while the amplitude doubles. So
+    the parameter moves by half of what it moved over the doubling before; with damping it comes to the peak,
+    by ``(sqrt(3) - 0)/(sqrt(15) - sqrt(3)) = 0.81`` of that.
+    """
     sizes = np.abs(side.rows.joints[: side.last + 1, :, 1:]).max(axis=(1, 2))
-    half = np.flatnonzero(sizes <= 0.5 * sizes[-1])
-    if not len(half) or sizes[-1] < _HUGE:
-        return False
-    return bool(np.ptp(side.rows.w[half[-1] : side.last + 1, 0]) < _STANDS * settings.width)
+    half, quarter = (np.flatnonzero(sizes <= share * sizes[-1]) for share in (0.5, 0.25))
+    if not len(quarter) or sizes[-1] < _HUGE:
+        return None
+    values = side.rows.w[: side.last + 1, 0]
+    lately, before = abs(values[-1] - values[half[-1]]), abs(values[half[-1]] - values[quarter[-1]])
+    if np.ptp(values[half[-1] :]) >= _STANDS * settings.width:
+        return None
+    if lately < _HALVES * before:
+        return End(EndReason.UNBOUNDED)
+    return End(EndReason.STEP, _AT_PEAK.format(size=sizes[-1]))
 
 
 def lost_in_end(event: Bifurcation, end: Orbit, parameter: str, width: float) -> bool:
