@@ -297,10 +297,8 @@ def _beside(
         return None
     onward = following.params[branch.parameter] - value
     if is_short(branch):  # nothing is solved on it: a point is on the side on which the branch ends
-        inner = np.flatnonzero(between)
-        if abs(onward) <= slack or not inner.size:
-            return None
-        return int(np.sign(onward)), branch[int(inner[inner.size // 2])]
+        inner = np.flatnonzero(between & (abs(onward) > slack))
+        return (int(np.sign(onward)), branch[int(inner[inner.size // 2])]) if inner.size else None
     # in the middle of what is beyond the slack, where the parameter goes on to the next event
     share = 0.5 * (1.0 + slack / abs(onward)) if abs(onward) > slack else 0.5
     solved = _solved_at(branch, position + share * (reach - position), width)
@@ -322,19 +320,15 @@ def _solved_at(branch: Branch, arc: float, width: float) -> Orbit | None:
     if not length > 0.0:
         return None
     one, guess, other = (branch.between(float(a)) for a in (arcs[k - 1], arc, arcs[k]))
-    own = settings_of(branch[0], branch.parameter, _extent(branch), None, False, 2)
+    low, high = float(branch.values.min()), float(branch.values.max())
+    rounding = 1e-9 * branch.model.size_of(branch.model.index_of(branch.parameter), low)
+    around = low - rounding, high + rounding
+    own = settings_of(branch[0], branch.parameter, around, None, False, 2)
     settings = replace(own, width=width)
     chord = (other.joints - one.joints) / length
     point = first_point(guess, settings, chord, float(values[k] - values[k - 1]) / length)
     active = branch.model.index_of(branch.parameter)
     return None if point is None else point.orbit(branch, active)
-
-
-def _extent(branch: Branch) -> tuple[float, float]:
-    """Return a range around the values of a branch."""
-    low, high = float(branch.values.min()), float(branch.values.max())
-    rounding = 1e-9 * branch.model.size_of(branch.model.index_of(branch.parameter), low)
-    return low - rounding, high + rounding
 
 
 def _sum(

@@ -108,6 +108,7 @@ class Incident:
     """The unit of the solution at an event, its forms, and the outcomes that are rejected.
 
     ``names`` say what the step from one form to another is called; margins below ``least`` count as zero.
+    An event that is known roughly is ``wide``: what vanishes there is not known to first order.
     """
 
     unit: Unit
@@ -157,7 +158,7 @@ def incident_forms(
         tuple(collection.refusals),
         tuple(collection.names),
         least,
-        wide,
+        wide or bifurcation.accuracy > ACCURACY,
     )
 
 
