@@ -343,7 +343,8 @@ def _turns(side: Side, first: int, scale: float) -> FloatArray:
     rows, last = side.rows, side.last
     z, w = rows.tangents[first : last + 1], rows.directions[first : last + 1, 0]
     along = np.sum(z[1:] * z[:-1], axis=(1, 2)) / z.shape[1] + w[1:] * w[:-1] * scale
-    return np.arccos(np.clip(along, -1.0, 1.0))
+    angles: FloatArray = np.arccos(np.clip(along, -1.0, 1.0))
+    return angles
 
 
 def _touches(side: Side, orbit: Orbit, first: int) -> NDArray[np.bool_]:
@@ -366,7 +367,7 @@ def _left_over(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> float:
     """Return by how much the parameter changes from a row to where its margin vanishes, with the square."""
     rows, test = side.rows, orbit.system.tests.index(found.tests[0])
     left = abs(float(rows.tests[k, test] / rows.tests[k - 1, test]))
-    return abs(float(rows.w[k, 0] - rows.w[k - 1, 0])) * left**0.5
+    return abs(float(rows.w[k, 0] - rows.w[k - 1, 0])) * float(np.sqrt(left))
 
 
 def _has_fallen(side: Side, orbit: Orbit, k: int, found: Bifurcation) -> bool:

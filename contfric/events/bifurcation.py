@@ -252,7 +252,7 @@ class Bifurcation(MeasuredEvent):
         # accuracies cost: they are asked for last
         if not _SYMMETRIC <= apart < _ASYMMETRIC:
             return apart < _SYMMETRIC
-        return apart < max(self.accuracy, min(_NEARLY_SYMMETRIC, self.accuracy**0.5))
+        return bool(apart < max(self.accuracy, min(_NEARLY_SYMMETRIC, self.accuracy**0.5)))
 
     @property
     def outline(self) -> Outline:
