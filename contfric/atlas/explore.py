@@ -37,6 +37,9 @@ from contfric.remember.advance import in_advance
 
 #: Longest orbits, in periods, that doublings are followed to by default: two doublings.
 MOST_PERIODS = 4
+#: Largest ``max_periods`` and ``copies`` that are taken: at each sliding event outcomes are combined over so
+#: many periods, and a cascade of doublings has ten generations by then.
+LONGEST = 1024
 
 
 def explore(
@@ -65,8 +68,8 @@ def explore(
         Whether the jumps of the flow (SS, AS, GS) are bridged by orbits with holds; without them
         branches end there.
     max_periods : int, optional
-        Longest orbits, in periods of the excitation: the diagram is the connected component, through
-        events, of all orbits whose shortest period is at most this. A start of longer period raises it,
+        Longest orbits, in periods of the excitation (at most 1024): the diagram is the connected component,
+        through events, of all orbits whose shortest period is at most this. A start of longer period raises it,
         and ``diagram.notes`` says so. By default period doublings are followed to 4 periods, with one copy.
     copies : int, optional
         At a sliding event orbits of so many times the shortest period of the motion are tried: it has several
@@ -101,9 +104,9 @@ def explore(
     if not orbit.converged:
         raise ConvergenceError(f"the orbit is not solved: {orbit.status.value}", orbit)
     if copies is not None:
-        whole_number("copies", copies, least=1)
+        whole_number("copies", copies, least=1, most=LONGEST)
     if max_periods is not None:
-        whole_number("max_periods", max_periods, least=1)
+        whole_number("max_periods", max_periods, least=1, most=LONGEST)
     whole_number("max_branches", max_branches, least=1)
     function_of("progress", progress)
     bridges, seeds = truth("bridges", bridges), Seeds.given(seeds)

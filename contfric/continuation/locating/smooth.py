@@ -75,9 +75,9 @@ def smooth_events(step: Step) -> list[Located]:
     values = [*zip(starts, step.after.tests[base:].tolist(), strict=True)]
     found: list[Located] = []
     folded = False
-    both = np.array([values[CHI_ONE], values[CHI_MINUS]])
+    products = values[CHI_ONE], values[CHI_MINUS]
     # the largest multiplier changes its sign through infinity, or by rounding next to it
-    infinite = bool(np.all(both[:, 0] * both[:, 1] < 0.0) and np.abs(both).min() > INFINITE)
+    infinite = all(a * b < 0.0 and min(abs(a), abs(b)) > INFINITE for a, b in products)
     for column, (a, b) in enumerate(values):
         if not a * b < 0.0 or (column == CHI_ONE and folded):
             continue  # chi(1) of a fold vanishes with it

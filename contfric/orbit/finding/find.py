@@ -322,6 +322,6 @@ def _check_motion(trajectory: Trajectory) -> None:
         says = "; `contfric check` says where no mode follows" if missing else ""
         why += out_of_range(trajectory)
         raise ConvergenceError(
-            f"no periodic orbit: {why}. Choose other parameters or another start{says}",
+            f"no periodic orbit: {why}. Choose other parameters or another start (state=...){says}",
             trajectory,
         )

@@ -62,7 +62,7 @@ def check_rest(trajectory: Trajectory) -> None:
 def _stays_at(trajectory: Trajectory) -> str:
     return (
         f"no periodic orbit: the solution comes to rest at {_place(trajectory.model, trajectory.last[2])}, "
-        "and nothing moves it from there. Choose other parameters or another start"
+        "and nothing moves it from there. Choose other parameters or another start (state=...)"
     )
 
 
@@ -131,7 +131,7 @@ def comes_to_rest(trajectory: Trajectory) -> str:
     where = _place(trajectory.model, trajectory.states[-1])
     return (
         f"no periodic orbit: the solution comes to rest near {where}, where surfaces meet: it crosses them "
-        "in smaller and smaller turns. Choose other parameters or another start"
+        "in smaller and smaller turns. Choose other parameters or another start (state=...)"
     )
 
 
