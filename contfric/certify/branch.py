@@ -115,15 +115,16 @@ class BranchCertificate(Shown):
     @property
     def covered(self) -> float:
         """Share of the arclength on which the branch is proved to be one curve of admissible orbits."""
-        whole = sum(p.stop - p.start for p in self.pieces)
-        return sum(p.stop - p.start for p in self.pieces if p.proved) / whole if whole else 0.0
+        return self._share([p for p in self.pieces if p.proved])
 
     @property
     def regular(self) -> float:
         """Share of the arclength on which it has neither a fold nor a multiplier -1 in addition."""
+        return self._share([p for p in self.pieces if p.regular])
+
+    def _share(self, pieces: Sequence[Piece]) -> float:
         whole = sum(p.stop - p.start for p in self.pieces)
-        found = (p for p in self.pieces if p.regular)
-        return sum(p.stop - p.start for p in found) / whole if whole else 0.0
+        return sum(p.stop - p.start for p in pieces) / whole if whole else 0.0
 
     @property
     def proved(self) -> bool:

@@ -289,30 +289,14 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
     ResultFileError
         If the file cannot be read, or holds no certificate of a diagram.
     """
+    from pydantic import TypeAdapter  # slow to load
+
     file: Path = path_of("a certificate file", path)
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["certificate"] != _KIND or data["format"] != _FORMAT:
             raise ValueError(f"it is no certificate of a diagram of format {_FORMAT}")
-        checkable, data = tuple(data["checkable"]), data["summary"]
-        branches = tuple(
-            BranchSummary(
-                **{
-                    **b,
-                    "gaps": tuple(Gap(**g) for g in b["gaps"]),
-                    "events": tuple(b.get("events", ())),
-                    "open": tuple(b.get("open", ())),
-                }
-            )
-            for b in data.pop("branches")
-        )
-        events = tuple(
-            EventSummary(**{**e, "branches": tuple(e["branches"])}) for e in data.pop("events")
-        )
-        low, high = data.pop("range")
-        data["same"] = tuple(data.get("same", ()))
-        return DiagramCertificate(
-            branches=branches, events=events, range=(low, high), checkable=checkable, **data
-        )
+        found = data["summary"] | {"checkable": data["checkable"]}
+        return TypeAdapter(DiagramCertificate).validate_python(found)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ResultFileError(f"cannot read {file}: {error}; give a certificate.json") from error

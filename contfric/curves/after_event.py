@@ -203,10 +203,10 @@ def prove(
     curve begins near the point: there the normal form is small, and tells of no continuum.
     """
     for share in _PROOFS:
-        beside = _step_away(problem, start, border, share * largest)
-        if beside is None:
+        near = _step_away(problem, start, border, share * largest)
+        if near is None:
             continue
-        orbit = problem.orbit(beside.joints, beside.w)
+        orbit = problem.orbit(near.joints, near.w)
         margins, pinned = orbit.margins, problem.condition.pinned
         held = np.abs(margins[pinned]) < _STILL
         free, still = pinned[~held], np.sort(pinned[held])
@@ -216,7 +216,7 @@ def prove(
         fine = lasts and bool(np.all(margins[others] > 0.0)) and has_multiplier(problem, orbit)
         if not fine or _is_exit(problem, still) or is_simpler(problem, orbit):
             continue
-        if not born and is_continuum(problem, start) and is_continuum(problem, beside):
+        if not born and is_continuum(problem, start) and is_continuum(problem, near):
             return None
         if len(free):
             start.tests[free] = np.maximum(0.0, problem.orbit(start.joints, start.w).margins[free])

@@ -45,7 +45,7 @@ from contfric.events.sliding_kinds import kind_of_margin
 from contfric.orbit.orbit import Orbit
 
 #: Distances near a degenerate point at which the curve that leaves is started: as for branches.
-_BESIDE = (1e-2, 3e-3, 1e-3)
+_DISTANCES = (1e-2, 3e-3, 1e-3)
 #: Margins below this vanish at a located point; those of two located events agree to about 1e-8.
 _VANISHES = 1e-6
 
@@ -141,8 +141,8 @@ def _born(special: SpecialPoint, problem: Problem, largest: float) -> Iterator[S
     fold = fold_problem(whole, problem.box)
     if fold is None:
         return
-    for distance in _BESIDE:
-        start = beside(fold, whole, phi, distance)
+    for distance in _DISTANCES:
+        start = solved_along(fold, whole, phi, distance)
         if start is not None:
             point, border = start
             proved = prove(fold, point, border, largest, born=True)
@@ -172,7 +172,7 @@ def fold_problem(orbit: Orbit, box: PlaneRanges) -> Problem | None:
     return None
 
 
-def beside(
+def solved_along(
     problem: Problem, orbit: Orbit, direction: FloatArray, distance: float
 ) -> tuple[Point, FloatArray] | None:
     """Solve for a point of a curve a distance away from an orbit along a direction of its joints."""
@@ -214,8 +214,8 @@ def _tangential_release(special: SpecialPoint, problem: Problem, largest: float)
         own = replace(
             own, condition=own.condition._replace(pinned=np.array([own.system.tests.index(test)]))
         )
-        for distance in _BESIDE:
-            start = beside(own, edited, longer, distance)
+        for distance in _DISTANCES:
+            start = solved_along(own, edited, longer, distance)
             if start is None:
                 continue
             proved = prove(own, start[0], start[1], largest)

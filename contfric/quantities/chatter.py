@@ -58,8 +58,8 @@ def _flight(
     gap = model.surface_by_name[wall].observable
     if not part.exact:
         state = model.view(vector).state(mode, part.start, part.state, lasts)
-        behind = model.view(vector).reset(wall, end, state)
-        return replace(part, mode=mode, lasts=lasts), replace(part, start=end, state=behind)
+        after = model.view(vector).reset(wall, end, state)
+        return replace(part, mode=mode, lasts=lasts), replace(part, start=end, state=after)
     before, moved, by_time = _moved(part, mode, lasts)
     every = np.arange(len(vector))
     grad, slope = np.empty(1 + n + len(every)), np.empty(len(every))
@@ -71,11 +71,11 @@ def _flight(
     )
     d_lasts = -height / rate
     joint = np.vstack([part.d_start + d_lasts, moved + np.outer(by_time, d_lasts)])
-    behind, jac = np.empty(n), np.empty((n, 1 + n + len(every)))
-    model.flow.reset(k, end, before, vector, every, behind, jac)
-    d_behind = jac[:, : 1 + n] @ joint + jac[:, 1 + n :] @ part.d_vector
+    after, jac = np.empty(n), np.empty((n, 1 + n + len(every)))
+    model.flow.reset(k, end, before, vector, every, after, jac)
+    d_after = jac[:, : 1 + n] @ joint + jac[:, 1 + n :] @ part.d_vector
     flight = replace(part, mode=mode, lasts=lasts, d_lasts=d_lasts)
-    following = replace(part, start=end, state=behind, d_start=joint[0], d_state=d_behind)
+    following = replace(part, start=end, state=after, d_start=joint[0], d_state=d_after)
     return flight, following
 
 

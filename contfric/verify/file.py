@@ -103,9 +103,9 @@ def _check_tube(data: Any) -> tuple[list[str], list[Any]]:
     see(sorted(found) == sorted(stated + data["events"]), f"it has those events, not {found}")
     same = sorted((k * d, k * e) for d, e in knots[0][0].segments for k in {1, knots[0][0].closing})
     shown, ends = f"{len(data['events'])} events of multipliers", dict[Any, Any]()
-    for k, beside in ((0, 1), (-1, -2)):  # with the next knot, as tubes may go on from one
+    for k, inner in ((0, 1), (-1, -2)):  # with the next knot, as tubes may go on from one
         known = str((data["segments"], data["half"], data["periods"], data["knots"][k], ctx.prec))
-        ends[known if points[k].fixed else object()] = knots[k], knots[beside]
+        ends[known if points[k].fixed else object()] = knots[k], knots[inner]
     return ["one curve", "admissible", shown], [same, ends, boxes]
 
 

@@ -223,6 +223,7 @@ def test_an_event_that_the_checker_refuses_is_said_and_not_in_the_file(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Where two events happen at once a file of one would be refused, and all that stands next to it."""
+    assert not proved().unchecked
     orbit = cf.find_orbit("coulomb", {"Omega": 0.54})
     branch = cf.continue_orbit(orbit, "Omega", (0.538, 0.545))
     proofs: list[Any] = [branch.bifurcations[0].certify(), orbit.certify()]
@@ -239,4 +240,3 @@ def test_an_event_that_the_checker_refuses_is_said_and_not_in_the_file(
         assert main(["verify", str(tmp_path / "c.json")]) == 0
         said = capsys.readouterr().out
         assert "not in the file: SN_1a" in said and "the checker refuses it: false" in said
-    assert not proved().unchecked

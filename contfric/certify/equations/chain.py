@@ -65,6 +65,11 @@ class Segments:
         """Number of states."""
         return len(self.closure)
 
+    @property
+    def closing(self) -> arb_mat:
+        """The closure in balls."""
+        return arb_mat([[arb(c) for c in row] for row in self.closure])
+
 
 def segments_of(system: System) -> Segments:
     """Return the chain of a system, with names in the place of its indices."""

@@ -28,10 +28,10 @@ from contfric.orbit.orbit import Orbit
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:
     """Return the matrix D of the closure on the extended state."""
     size, n = model.size, model.states
-    rows = zeros(size, size)
+    rows, closing = zeros(size, size), segments.closing
     for a in range(n):
         for b in range(n):
-            rows[a][b] = arb(segments.closure[a][b])
+            rows[a][b] = closing[a, b]
     rows[n][n] = arb(1)
     for k, turns in enumerate(model.turns):
         sign = -1 if half and turns % 2 else 1

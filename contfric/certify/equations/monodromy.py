@@ -13,7 +13,7 @@ rounding.
 
 from __future__ import annotations
 
-from flint import arb, arb_mat
+from flint import arb_mat
 
 from contfric.certify.equations.chain import Chain
 from contfric.models.balls.numbers import Vector, column, identity
@@ -43,7 +43,7 @@ def _passing(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
     n, model, segments = chain.n, chain.model, chain.segments
     last = i + 1 == segments.count
     row, field = model.surfaces[segments.exits[i]], model.fields[segments.modes[i]]
-    closure = arb_mat([[arb(c) for c in line] for line in segments.closure])
+    closure = segments.closing
     one = identity(n)
     closes = last and closure != one
     at = joints[i + 1] if closes else joints[(i + 1) % segments.count]

@@ -98,7 +98,7 @@ def _step(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
 def _closed_back(chain: Chain) -> arb_mat:
     """Return the inverse of the closure."""
     n = chain.n
-    back = arb_mat([[arb(c) for c in row] for row in chain.segments.closure]).inv()
+    back = chain.segments.closing.inv()
     rows = [[arb(1), *[arb(0)] * n]]
     return arb_mat([*rows, *([arb(0), *(back[a, b] for b in range(n))] for a in range(n))])
 

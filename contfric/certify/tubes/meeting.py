@@ -139,7 +139,7 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     orbit = location.orbit
     segments = segments_of(orbit.system)
     m, half = segments.states + 1, orbit.system.half
-    closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
+    closure = segments.closing
     one = identity(m - 1)
     twice = closure * closure == one  # for certain
     if not twice:

@@ -129,7 +129,7 @@ def turns_of(proof: EventCertificate, system: System, near: Vector) -> Turns | N
     if pair.system.segments != system.segments or pair.periods != system.periods:
         return None
     segments = segments_of(orbit.system)
-    closure = arb_mat([[arb(c) for c in row] for row in segments.closure])
+    closure = segments.closing
     one = identity(segments.states)
     autonomous = orbit.model.autonomous
     scale = arb(1) if autonomous else 2 * arb.pi() / orbit.flow.period

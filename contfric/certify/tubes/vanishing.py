@@ -155,11 +155,21 @@ def vanishing_at(tracer: Tracer, proofs: list[EventCertificate], end: int) -> Va
 
 def _last(tracer: Tracer, place: ShortSlide, near: Vector) -> Vector | None:
     """Return balls of the orbit next to a printed end, a little before it, with the duration of its slide."""
-    m = tracer.segments.states + 1
-    at = place.segment * m, (place.segment + 1) * m
+    at = _times(tracer, place)
     point = solution_with(tracer, place, near, (near[at[1]] - near[at[0]] + tracer.end).mid())
-    plane = [arb(int(k == at[1]) - int(k == at[0])) for k in range(len(near))]
+    plane = _by_times(at, len(near))
     return None if point is None else orbit_in(tracer.segments, tracer.build, point, plane)
+
+
+def _times(tracer: Tracer, place: ShortSlide) -> tuple[int, int]:
+    """Return the numbers of the times of the ends of the slide among the unknowns."""
+    m = tracer.segments.states + 1
+    return place.segment * m, (place.segment + 1) * m
+
+
+def _by_times(at: tuple[int, int], size: int) -> Vector:
+    """Return the derivatives of the duration of the slide by the unknowns."""
+    return [arb(int(k == at[1]) - int(k == at[0])) for k in range(size)]
 
 
 def solution_with(tracer: Tracer, place: ShortSlide, near: Vector, d: arb) -> Vector | None:
@@ -178,13 +188,11 @@ def solution_with(tracer: Tracer, place: ShortSlide, near: Vector, d: arb) -> Ve
 
 def _equations(tracer: Tracer, place: ShortSlide, x: Vector, d: arb) -> tuple[Vector, arb_mat]:
     """Return the residuals at the duration d of the slide, and their Jacobian."""
-    m = tracer.segments.states + 1
-    at = place.segment * m, (place.segment + 1) * m
+    at = _times(tracer, place)
     length = x[at[1]] - x[at[0]]
     chain = ShortSlideChain(tracer.segments, tracer.build(x[-1]), place, x, length)
     residual, rows = chain.regular()
-    last = [arb(int(k == at[1]) - int(k == at[0])) for k in range(len(x))]
-    return [*residual, length - d], arb_mat([*rows, last])
+    return [*residual, length - d], arb_mat([*rows, _by_times(at, len(x))])
 
 
 def box_up_to(
@@ -209,10 +217,9 @@ def box_up_to(
         if not np.all(np.isfinite(gap)):
             return None
         if np.all((gap @ radii + moved) * (1 + 1e-9) < radii):
-            m = tracer.segments.states + 1
-            at = place.segment * m, (place.segment + 1) * m
+            at = _times(tracer, place)
             change = [inverse[k, size - 1] for k in range(size)]
-            plane = [arb(int(k == at[1]) - int(k == at[0])) for k in range(size)]
+            plane = _by_times(at, size)
             widths = [arb(float(r)) for r in radii]
             piece = _piece(tracer, place, box, arb(reach), end)
             least = arb(0) if end is None else end[at[1]] - end[at[0]]

@@ -281,9 +281,9 @@ def draw_row(
 ) -> None:
     """Draw one quantity of branches, with the marks of events, and name the axes."""
     label = row_of(row, model_of(branches))
-    twins = {b.name for b in branches if not b.mirrored} if label.even else set()
+    originals = {b.name for b in branches if not b.mirrored} if label.even else set()
     for branch in sorted(branches, key=lambda b: not b.mirrored):
-        if branch.mirrored and branch.name in twins:
+        if branch.mirrored and branch.name in originals:
             continue  # it lies on its original
         _draw_branch(ax, branch, row, look)
     draw_marks(ax, marks)

@@ -111,14 +111,16 @@ def _row(diagram: Diagram, name: str) -> dict[str, Any]:
     """Return one quantity with its marks; of an even one, mirror images lie on their originals."""
     originals = {b.name for b in diagram.branches if not b.mirrored}
     row = ROWS[name]
-    twins = [
-        row.even and branch.mirrored and branch.name in originals for branch in diagram.branches
+    left_out = [
+        i
+        for i, branch in enumerate(diagram.branches)
+        if row.even and branch.mirrored and branch.name in originals
     ]
     found = marks_of(diagram.bifurcations, diagram.branches, name, diagram.parameter)
     return {
         "name": name,
         "label": {"stops": "x at stops", "psi": "ψ"}.get(name, name),
-        "left_out": [i for i, twin in enumerate(twins) if twin],
+        "left_out": left_out,
         "marks": [_mark(mark, diagram) for mark in found],
     }
 
