@@ -357,9 +357,11 @@ def _touches(side: Side, orbit: Orbit, first: int) -> NDArray[np.bool_]:
     low = max(first, 1)
     if low >= last:
         return touches
-    here = margins[low:last]
-    near = _FALLEN * np.minimum(margins[low - 1 : last - 1], margins[low + 1 : last + 1])
-    touches[low - first :] = np.any(np.abs(here) < np.minimum(_LEFT, near), axis=1)
+    here, after = margins[low:last], margins[low + 1 : last + 1]
+    near = _FALLEN * np.minimum(margins[low - 1 : last - 1], after)
+    # where it comes from zero again as another margin changes its sign, that one is located
+    located = np.isfinite(after) & (after.min(axis=1, keepdims=True) < -_LEFT)
+    touches[low - first :] = np.any((np.abs(here) < np.minimum(_LEFT, near)) & ~located, axis=1)
     return touches
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import follow
+from contfric.atlas.leaving import from_flow
 from contfric.atlas.plane import explore as plane_explore
 
 
@@ -92,4 +92,4 @@ def test_whole_orbits_are_found_on_the_branches_of_their_halves() -> None:
     for branch in branches:
         for k in rng.integers(1, len(branch) - 1, 3):
             there = branch[int(k)].as_whole()  # as motions near an event come
-            assert [b for b in branches if follow._passes(b, there)] == [branch]
+            assert [b for b in branches if from_flow._passes(b, there)] == [branch]

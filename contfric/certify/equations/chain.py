@@ -65,22 +65,16 @@ class Segments:
         """Number of states."""
         return len(self.closure)
 
-    @property
-    def closing(self) -> arb_mat:
-        """The closure in balls."""
-        return arb_mat([[arb(c) for c in row] for row in self.closure])
-
 
 def segments_of(system: System) -> Segments:
     """Return the chain of a system, with names in the place of its indices."""
     model, layout = system.model, system.layout
     held = {hold.segment: hold for hold in holds_of(model, system.itinerary)}
-    pins: list[str | tuple[str, str] | None] = []
-    for i, (_, _) in enumerate(system.itinerary):
-        pin: str | tuple[str, str] | None = None
-        if i in held:
-            pin = held[i].pin or (system.itinerary[i - 1][0], system.itinerary[i - 1][1])
-        pins.append(pin)
+    # a hold without a pin of its own begins where the rate of the surface before it vanishes
+    pins = (
+        (held[i].pin or system.itinerary[i - 1]) if i in held else None
+        for i in range(system.segments)
+    )
     names = [s.name for s in model.surfaces]
     return Segments(
         tuple(mode for mode, _ in system.itinerary),

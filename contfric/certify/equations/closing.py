@@ -25,6 +25,11 @@ from contfric.orbit.itinerary.itineraries import whole_of
 from contfric.orbit.orbit import Orbit
 
 
+def closure_of_states(segments: Segments) -> arb_mat:
+    """Return the matrix K of the closure on the states."""
+    return arb_mat([[arb(c) for c in row] for row in segments.closure])
+
+
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:
     """Return the matrix D of the closure on the extended state."""
     size, n = model.size, model.states

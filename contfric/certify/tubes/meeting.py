@@ -17,7 +17,7 @@ from flint import arb, arb_mat
 
 from contfric.bvp.system import System
 from contfric.certify.equations.chain import Chain, Segments, segments_of
-from contfric.certify.equations.closing import closing_of
+from contfric.certify.equations.closing import closing_of, closure_of_states
 from contfric.certify.equations.extended import Builder
 from contfric.certify.equations.kept import Kept
 from contfric.certify.equations.short_slide import ShortSlide
@@ -139,7 +139,7 @@ def _cycle(proof: EventCertificate, model: BallModel, touched: bool = False) -> 
     orbit = location.orbit
     segments = segments_of(orbit.system)
     m, half = segments.states + 1, orbit.system.half
-    closure = segments.closing
+    closure = closure_of_states(segments)
     one = identity(m - 1)
     twice = closure * closure == one  # for certain
     if not twice:

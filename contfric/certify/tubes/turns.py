@@ -9,6 +9,7 @@ from flint import arb, arb_mat
 
 from contfric.bvp.system import System
 from contfric.certify.equations.chain import Segments, segments_of
+from contfric.certify.equations.closing import closure_of_states
 from contfric.certify.events import EventCertificate
 from contfric.events.bifurcation import Kind
 from contfric.models.balls.build import ball_model
@@ -129,7 +130,7 @@ def turns_of(proof: EventCertificate, system: System, near: Vector) -> Turns | N
     if pair.system.segments != system.segments or pair.periods != system.periods:
         return None
     segments = segments_of(orbit.system)
-    closure = segments.closing
+    closure = closure_of_states(segments)
     one = identity(segments.states)
     autonomous = orbit.model.autonomous
     scale = arb(1) if autonomous else 2 * arb.pi() / orbit.flow.period
