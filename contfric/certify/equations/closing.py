@@ -33,7 +33,7 @@ def closure_of_states(segments: Segments) -> arb_mat:
 def closure_matrix(segments: Segments, model: BallModel, half: bool) -> arb_mat:
     """Return the matrix D of the closure on the extended state."""
     size, n = model.size, model.states
-    rows, closing = zeros(size, size), segments.closing
+    rows, closing = zeros(size, size), closure_of_states(segments)
     for a in range(n):
         for b in range(n):
             rows[a][b] = closing[a, b]

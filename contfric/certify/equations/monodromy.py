@@ -16,6 +16,7 @@ from __future__ import annotations
 from flint import arb_mat
 
 from contfric.certify.equations.chain import Chain
+from contfric.certify.equations.closing import closure_of_states
 from contfric.models.balls.numbers import Vector, column, identity
 
 
@@ -43,7 +44,7 @@ def _passing(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
     n, model, segments = chain.n, chain.model, chain.segments
     last = i + 1 == segments.count
     row, field = model.surfaces[segments.exits[i]], model.fields[segments.modes[i]]
-    closure = segments.closing
+    closure = closure_of_states(segments)
     one = identity(n)
     closes = last and closure != one
     at = joints[i + 1] if closes else joints[(i + 1) % segments.count]

@@ -18,6 +18,7 @@ from __future__ import annotations
 from flint import acb, acb_mat, arb, arb_mat
 
 from contfric.certify.equations.chain import Chain
+from contfric.certify.equations.closing import closure_of_states
 from contfric.certify.verdict import Finding, Verdict
 from contfric.models.balls.numbers import Vector, column, row_norm
 
@@ -98,7 +99,7 @@ def _step(chain: Chain, joints: list[Vector], i: int) -> arb_mat | None:
 def _closed_back(chain: Chain) -> arb_mat:
     """Return the inverse of the closure."""
     n = chain.n
-    back = chain.segments.closing.inv()
+    back = closure_of_states(chain.segments).inv()
     rows = [[arb(1), *[arb(0)] * n]]
     return arb_mat([*rows, *([arb(0), *(back[a, b] for b in range(n))] for a in range(n))])
 
