@@ -17,9 +17,9 @@ _CALLS = re.findall(
 
 @pytest.mark.parametrize("call", _CALLS[:3])
 def test_it_moves(call: str) -> None:
-    orbit = eval(call, {"cf": cf})  # noqa: S307 # a call that the page shows
+    orbit = eval(call, {"cf": cf})  # a call that the page shows
     assert orbit.converged and orbit.admissible
-    with pytest.raises(cf.ConvergenceError, match="no periodic orbit: .* another start"):
+    with pytest.raises(cf.ConvergenceError, match=r"no periodic orbit: .* another start"):
         cf.find_orbit(orbit.model.name)
 
 
