@@ -70,7 +70,8 @@ def explore(
     max_periods : int, optional
         Longest orbits, in periods of the excitation (at most 1024): the diagram is the connected component,
         through events, of all orbits whose shortest period is at most this. A start of longer period raises
-        it, and ``diagram.notes`` says so. By default period doublings are followed to 4 periods, with one copy.
+        it, and ``diagram.notes`` says so. By default period doublings are followed to 4 periods, with one
+        copy.
     copies : int, optional
         At a sliding event orbits of so many times the shortest period of the motion are tried: it has several
         outcomes, and each period may have its own. ``max_periods`` if that is given, else 1; a branch that
