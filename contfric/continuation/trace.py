@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contfric.base.arrays import FloatArray
+from contfric.bvp.system import Margin
 from contfric.continuation.assembly import assemble, join
 from contfric.continuation.branch import Branch
 from contfric.continuation.ends.at_events import (
@@ -350,18 +351,18 @@ def _turns(side: Side, first: int, scale: float) -> FloatArray:
 def _touches(side: Side, orbit: Orbit, first: int) -> NDArray[np.bool_]:
     """Tell for each step from a row on whether a margin is zero where it begins, and at no point next to it.
 
-    A point may lie at the very corner, by chance: steps on either side of it need not be short.
+    A point may lie at the very corner, by chance: steps on either side of it need not be short. A load inside
+    of a stick touches its limit there. One at its end may touch it along a branch: at the second of
+    two equal maxima it is no event.
     """
-    last, margins = side.last, side.rows.tests[:, : len(orbit.system.tests)]
+    inside = [k for k, test in enumerate(orbit.system.tests) if test.margin is Margin.INTERIOR]
+    last, margins = side.last, side.rows.tests[:, inside]
     touches = np.zeros(max(0, last - first), dtype=bool)
     low = max(first, 1)
     if low >= last:
         return touches
-    here, after = margins[low:last], margins[low + 1 : last + 1]
-    near = _FALLEN * np.minimum(margins[low - 1 : last - 1], after)
-    # where it comes from zero again as another margin changes its sign, that one is located
-    located = np.isfinite(after) & (after.min(axis=1, keepdims=True) < -_LEFT)
-    touches[low - first :] = np.any((np.abs(here) < np.minimum(_LEFT, near)) & ~located, axis=1)
+    near = _FALLEN * np.minimum(margins[low - 1 : last - 1], margins[low + 1 : last + 1])
+    touches[low - first :] = np.any(np.abs(margins[low:last]) < np.minimum(_LEFT, near), axis=1)
     return touches
 
 
