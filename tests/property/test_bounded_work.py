@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
-from contfric.atlas import follow
+from contfric.atlas.leaving import from_flow
 from contfric.atlas.leaving.crossings import whole_branch
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings, settings_of
@@ -120,7 +120,10 @@ def test_no_branch_is_traced_twice(monkeypatch: pytest.MonkeyPatch) -> None:
         traced.append(whole_branch(orbit, settings))
         return traced[-1]
 
-    monkeypatch.setattr(follow, "whole_branch", kept)
+    monkeypatch.setattr(
+        from_flow, "_NEXT_TO_IT", np.inf
+    )  # else each is traced next to its event only
+    monkeypatch.setattr(from_flow, "whole_branch", kept)
     cf.explore(cf.find_orbit(model), "w", (0.7, 1.1), max_branches=45)
     spans = [(b.name, round(b.values.min(), 6), round(b.values.max(), 6)) for b in traced]
     assert len(set(spans)) == len(spans) > 5

@@ -55,7 +55,6 @@ CLASSES: dict[str, tuple[tuple[int, int], ...]] = {
     "two slides that vanish together, one of them first on another curve": ((40, 10),),
     "a stick that a slow load makes short, and that still ends in a jump": ((34, 360),),
     "a slide of no length between two crests of equal height": ((50, 62),),
-    "several slides of no length at an event that is known to its root": ((654, 43),),
     "two touches within one step": ((1, 435), (1, 1117), (1, 2243), (1, 2331), (1, 2413)),
 }
 #: Others with a branch point or a doubling of a bridge.

@@ -29,7 +29,6 @@ from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Settings
 from contfric.errors import NotationError
 from contfric.events.incident.unit import Form, Unit, form_of, pieces, unit_of
-from contfric.orbit.canonical.joint_units import joint_units
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.solve import refine
 
@@ -56,9 +55,8 @@ def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
 
     The vectors are scaled to the length of the hold.
     """
-    units, m = joint_units(orbit), orbit.joints.shape[1]
-    full = assembled(orbit.system, orbit.joints, orbit.vector) * np.tile(units, len(orbit.joints))
-    full /= np.abs(full).max(axis=1, keepdims=True)
+    full = assembled(orbit.system, orbit.joints, orbit.vector)
+    m = orbit.joints.shape[1]
     largest, found = float(np.linalg.norm(full, 2)), {}
     for hold, joints in enumerate(passages(orbit.system)):
         inner = np.array(joints[:-1])  # without the next pin
@@ -67,8 +65,7 @@ def turning_passages(orbit: Orbit) -> dict[int, FloatArray]:
         if not size[-1] < _NULL * largest or abs(right[-1][0]) < _NULL:
             continue
         vector = np.zeros_like(orbit.joints)
-        own = right[-1].reshape(len(inner), m) * units
-        vector[inner] = own / own[0, 0]
+        vector[inner] = (right[-1] / right[-1][0]).reshape(len(inner), m)
         found[hold] = vector
     return found
 
