@@ -72,9 +72,12 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
+    from contfric.models.deriving.growing_model import ComposedModel, composed_from
     from contfric.models.tied import tied
 
     loaded, given = tied(model, params)
+    if isinstance(loaded, ComposedModel):  # as it is declared, whatever modes were visited
+        loaded = composed_from(loaded.description)
     report = ModelReport(loaded.name, closed=loaded.closed_form, integrated=loaded.integrated)
     check_names(report, loaded)
     if params is None and not check_constraints(report, loaded):

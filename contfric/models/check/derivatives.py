@@ -184,10 +184,7 @@ def _cases(probe: Probe) -> list[Case]:
     for c, o in enumerate(model.observables):
         compiled, names = cases.scalar(flow.observe, c), cases.names_of_observable(o.name)
         found.append(Case(f"observable '{o.name}'", compiled, cases.observable(o.name), names))
-    written = {mode.name for mode in declared.description.modes}
     for m, mode in enumerate(model.modes):
-        if mode.name not in written:  # a composed model has visited it since
-            continue
         found += cases.field(m, mode.name)
         for c, o in enumerate(model.observables):
             what, rate = f"rate of '{o.name}' in mode '{mode.name}'", cases.scalar(flow.rate, m, c)
