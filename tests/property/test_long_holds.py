@@ -126,7 +126,7 @@ def test_the_diagram_is_the_same_from_every_branch(seed: int) -> None:
     assert held.balances and all(balance.holds for balance in held.balances)
 
 
-@pytest.mark.parametrize("unit", [0.55, 30.0])
+@pytest.mark.parametrize("unit", [0.03, 0.55, 30.0])
 @pytest.mark.parametrize("seed", (*SEEDS, 248))
 def test_it_is_the_same_in_another_unit_of_time(seed: int, unit: float) -> None:
     """Both have the same branches and events: one had ghosts (41), or no T next to an end (248)."""

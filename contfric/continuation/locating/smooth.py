@@ -259,8 +259,6 @@ def _changes(step: Step, k: int) -> list[Located]:
     found: list[Located] = []
     orbit, settings = step.orbit, step.settings
     vanishes = _vanishes(step, k)
-    if vanishes and _stays_to_end(step, k):
-        return found
     locations = locate_label(orbit, step.before, step.after, settings, k)
     if len(locations) > 1 and locations[1].arc - locations[0].arc < SAME_LOCATION:
         locations.pop()
@@ -289,14 +287,6 @@ def _jumps(step: Step, k: int, point: Point) -> bool:
     of_label = len(step.orbit.system.tests) + k
     left, *ends = (float(p.tests[of_label]) for p in (point, step.before, step.after))
     return left > max(_OUTSIDE, _FALLEN * max(ends))
-
-
-def _stays_to_end(step: Step, k: int) -> bool:
-    """Tell whether a label is that of the first point up to the event at the last one: it changes there."""
-    if step.length <= 2.0 * SAME_TANGENCY:
-        return False
-    near = point_at(step, SAME_TANGENCY)
-    return near is not None and bool(near.labels[k] == step.before.labels[k])
 
 
 def _stays(step: Step, k: int, point: Point) -> bool:

@@ -54,6 +54,9 @@ _VANISHES = 1e-9
 _NEARLY = 1e-6
 #: The most that an event may be missed by: beyond it is not nearly reached.
 _FAR = 1e-5
+#: Accuracy of an event that is known to the root of rounding, with some of its conditioning: what vanishes
+#: there is not known to first order.
+_TO_ITS_ROOT = 1e-7
 #: Most forms of a unit: six locations with two outcomes each.
 _MOST_FORMS = 64
 #: Where in a segment it is asked how far something has moved, as shares of it. One is irrational (the golden
@@ -158,7 +161,7 @@ def incident_forms(
         tuple(collection.refusals),
         tuple(collection.names),
         least,
-        wide or bifurcation.accuracy > ACCURACY,
+        wide or bifurcation.accuracy > _TO_ITS_ROOT,
     )
 
 
