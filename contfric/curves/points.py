@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from contfric.base.arrays import FloatArray, IntArray, with_entries
+from contfric.base.arrays import FloatArray, IntArray
 from contfric.base.pace import Pace
 from contfric.base.tally import tally
 from contfric.bvp.linear import assembled
@@ -145,45 +145,6 @@ def end_of_march(why: int) -> CurveEndReason | None:
         codes.ENDLESS: CurveEndReason.PERIOD,
     }
     return ends.get(why)
-
-
-def returned(problem: Conditioned, start: Point, marched: Marched) -> int | None:
-    """Return the first row of a march over which a curve passes its start again, in its direction.
-
-    Around a resonance the phase of the solution turns once, and the same orbit is met a period later.
-    """
-    rows, last = marched.rows, slice(marched.first - 1, marched.stop)
-    near = 1.5 * np.diff(rows.arc[last])
-    gaps = np.max(np.abs(rows.w[last][1:] - start.w) / problem.box.widths, axis=1)
-    # the first steps, each longer, are near, too
-    left = rows.arc[last][1:] - start.arc > 2.0 * near
-    for k in np.flatnonzero(left & (gaps <= near)).tolist():
-        row = marched.first + k
-        if _passes(problem, start, rows.point(row - 1), rows.point(row), float(near[k])):
-            return row
-    return None
-
-
-def _passes(problem: Conditioned, start: Point, before: Point, after: Point, near: float) -> bool:
-    """Tell whether a step passes a point in its direction, some turns earlier."""
-    model, turns = problem.system.model, 0
-    if not model.autonomous:
-        turns = round(float(after.joints[0, 0] - start.joints[0, 0]) / _period(problem, after))
-    along = []
-    for point in (before, start, after):
-        joints = point.joints.copy()
-        if turns and point is not start:  # a period changes along the curve
-            joints[:, 0] -= turns * _period(problem, point)
-        ahead = float(np.sum(joints * start.tangent)) / len(joints)
-        along.append(ahead + float(np.sum(point.w * start.direction / problem.box.widths**2)))
-    gap = np.sqrt(np.sum((joints - start.joints) ** 2) / len(joints))
-    apart = np.hypot(gap, np.linalg.norm((after.w - start.w) / problem.box.widths))
-    return bool(apart <= near) and along[0] < along[1] <= along[2]
-
-
-def _period(problem: Conditioned, point: Point) -> float:
-    vector = with_entries(problem.vector, problem.which, point.w)
-    return float(problem.system.model.view(vector).period)
 
 
 def solve_point(

@@ -15,7 +15,7 @@ from contfric.curves.assembly import join_sides
 from contfric.curves.codimension_two.births import birth_among
 from contfric.curves.curve import Curve
 from contfric.curves.half_curve import CurveSide, end_at_birth, end_at_limit, near_limit, resolve
-from contfric.curves.points import end_of_march, first_curve_point, march_on, returned
+from contfric.curves.points import end_of_march, first_curve_point, march_on
 from contfric.curves.problem import Problem, check_start, problem_of
 from contfric.curves.ranges import box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
@@ -276,11 +276,6 @@ def _advance(side: CurveSide, step: float, largest: float, most: int) -> tuple[b
     if limit is not None:
         side.points += fresh[:limit]
         return end_at_limit(side, fresh[limit]), step
-    closed = returned(problem, side.points[0], marched)
-    if closed is not None and closed < lasting:
-        side.points += fresh[: closed + 1 - first]
-        side.end = CurveEnd(CurveEndReason.CLOSED)
-        return True, step
     if why in (EVENT, OUTSIDE):
         side.points += fresh[:-1]
         return resolve(side, fresh[-1], border), step

@@ -205,14 +205,23 @@ def outside(w, box):  # type: ignore[no-untyped-def]
 
 
 @helper
-def returned(z, w, start_z, start_w, last_z, last_w, scale, step):  # type: ignore[no-untyped-def]
-    """Tell whether a step passes the start (point, tangent) again in the same direction."""
-    if distance(z, w, start_z[0], start_w[0], scale) > 1.5 * step:
-        return False
-    tz, tw = start_z[1], start_w[1]
-    start = product(start_z[0], start_w[0], tz, tw, scale)
-    last = product(last_z, last_w, tz, tw, scale)
-    return last < start <= product(z, w, tz, tw, scale)
+def seen_from(start_z, start_w, z, w, later, scale):  # type: ignore[no-untyped-def]
+    """Return how far a point, made earlier by ``later``, is from a start, and how far along its tangent."""
+    total, ahead = 0.0, 0.0
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            gap = z[i, j] - start_z[0, i, j]
+            if j == 0:
+                gap -= later
+            total += gap * gap
+            ahead += gap * start_z[1, i, j]
+    total /= z.shape[0]
+    ahead /= z.shape[0]
+    for k in range(w.shape[0]):
+        gap = w[k] - start_w[0, k]
+        total += gap * gap * scale[k]
+        ahead += gap * start_w[1, k] * scale[k]
+    return math.sqrt(total), ahead
 
 
 @helper

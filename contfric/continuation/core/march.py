@@ -35,7 +35,7 @@ from contfric.continuation.core.geometry import (
     outside,
     predict,
     product,
-    returned,
+    seen_from,
 )
 from contfric.continuation.core.pairs import hidden_pair, recall
 from contfric.continuation.core.steps import (
@@ -43,6 +43,7 @@ from contfric.continuation.core.steps import (
     accept_branch,
     along_branch,
     changed,
+    copy_free,
     correct_branch,
     observe_branch,
     told,
@@ -63,6 +64,9 @@ _MOST_MISS = 0.3
 #: A miss below this is no other branch: where equations are singular together, at a branch point, a solved
 #: point is off by as much, and steps were as short as that for thousands of points.
 _BLUR = 1e-8
+#: Steps in which a branch leaves its start, and is near it. Steps that pass the start later are shortened
+#: to a point that is no farther from it than this share of the step.
+_FIRST_STEPS, _ON_START = 3, 1e-2
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
 #: Times of joints are unknowns like states. In a turn longer than this they are far larger than these, as in
@@ -70,6 +74,52 @@ _UNBOUNDED = 1e6
 _LONG = 50.0
 #: A turn this long (nondimensional) of an autonomous model is on its way to an infinite one.
 _ENDLESS = 1e4
+
+
+@helper
+def from_start(way, course, k, turns):  # type: ignore[no-untyped-def]
+    """Return how far row k is from the start, and how far ahead of it, that many periods earlier."""
+    points, later = course.points, 0.0
+    if turns != 0.0:
+        equations = way.workspace.equations
+        copy_free(way.p, way.which, points.w[k])
+        later = turns * way.functions.period(way.p, equations.none, equations.empty)
+    return seen_from(
+        course.start_z, course.start_w, points.joints[k], points.w[k], later, way.scale
+    )
+
+
+@helper
+def round_again(way, course, k, step):  # type: ignore[no-untyped-def]
+    """Return (gap, how far ahead) of rows k - 1 and k from the start, in steps; infinite where that is far.
+
+    The phase of a solution against the excitation may turn along a closed branch: an orbit of several periods
+    is then met one or more of them later, and is the same. A period may change along the branch.
+    """
+    zs, ws, near, turns = course.points.joints, course.points.w, 0.0, 0.0
+    for j in range(way.scale.shape[0]):
+        near += (ws[k, j] - course.start_w[0, j]) ** 2 * way.scale[j]
+    if math.sqrt(near) > 1.5 * step:
+        return np.inf, np.inf, np.inf, np.inf
+    if way.layout.turn != 0.0:
+        equations = way.workspace.equations
+        period = way.functions.period(way.p, equations.none, equations.empty)
+        turns = round((zs[k, 0, 0] - course.start_z[0, 0, 0]) / period)
+    last, before = from_start(way, course, k - 1, turns)
+    gap, ahead = from_start(way, course, k, turns)
+    return last / step, before / step, gap / step, ahead / step
+
+
+@helper
+def share_to_start(way, course, k, step):  # type: ignore[no-untyped-def]
+    """Return up to which share the step to row k is taken again to end on the start that it passes; 1 if not.
+
+    Whether it is the start is told there: with long steps other orbits are near it, some periods later.
+    """
+    last, before, gap, ahead = round_again(way, course, k, step)
+    if gap > 1.5 or last < _ON_START or before > -_ON_START or ahead < _ON_START:
+        return 1.0
+    return (0.5 * _ON_START - before) / (ahead - before)
 
 
 @helper
@@ -82,10 +132,10 @@ def arrival(way, course, k, taken, step):  # type: ignore[no-untyped-def]
         return EVENT
     if outside(ws[k], course.box):
         return OUTSIDE
-    if taken > 3 and returned(
-        zs[k], ws[k], course.start_z, course.start_w, zs[k - 1], ws[k - 1], way.scale, step
-    ):
-        return CLOSED
+    if taken > _FIRST_STEPS:
+        last, _before, gap, _ahead = round_again(way, course, k, step)
+        if min(last, gap) < _ON_START:
+            return CLOSED
     if largest_state(zs[k]) > _UNBOUNDED:
         return UNBOUNDED
     if way.layout.turn == 0.0 and -zs[k, 0, 0] > _ENDLESS:
@@ -194,6 +244,11 @@ def marching(correct_at: Any, observe_at: Any, accept: Any) -> Any:
             if step > 1e-4 * largest:
                 share = accepted_share(way, points, k, length, step)
                 if share < 1.0:
+                    step *= share
+                    continue
+            if taken >= _FIRST_STEPS:
+                share = share_to_start(way, course, row, step)
+                if share < 1.0 and share * step > 64.0 * smallest:
                     step *= share
                     continue
             k, taken = row, taken + 1

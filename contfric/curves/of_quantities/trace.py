@@ -17,7 +17,7 @@ from contfric.continuation.trace import continue_orbit
 from contfric.curves.codimension_two.locating import CurveStep
 from contfric.curves.of_quantities.curve import QuantityCurve
 from contfric.curves.of_quantities.step import Held
-from contfric.curves.points import end_of_march, march_on, returned
+from contfric.curves.points import end_of_march, march_on
 from contfric.curves.ranges import PlaneRanges, Ranges, box_of
 from contfric.curves.special import CurveEnd, CurveEndReason
 from contfric.curves.trace import Progress, checked_options
@@ -224,15 +224,11 @@ class HeldSide:
     def _advance(self, step: float, most: int) -> float | None:
         """March once and keep the points up to an end; return the next step, None if there is one."""
         found = march_on(self.held, self.points, self.held.border, step, self.largest, most)
-        closed = returned(self.held, self.points[0], found)
-        for row, point in enumerate(found.rows.points(found.first, found.stop), found.first):
+        for point in found.rows.points(found.first, found.stop):
             if min(self.held.inside(point)) < 0.0:
                 self._finish(self.points[-1], point)
                 return None
             self.points.append(point)
-            if row == closed:
-                self.end = CurveEnd(CurveEndReason.CLOSED)
-                return None
         reason = end_of_march(found.why)
         if reason is not None:
             self.end = CurveEnd(reason)
