@@ -6,7 +6,7 @@ import difflib
 import math
 import operator
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -203,7 +203,9 @@ def checked_range(name: str, bounds: object) -> tuple[float, float]:
     >>> checked_range("Omega", (0.3, 1))
     (0.3, 1.0)
     """
-    ends = tuple(bounds) if isinstance(bounds, Iterable) else ()
+    # a set has no order, a mapping has other values, an iterator can be read once
+    ordered = isinstance(bounds, Sequence) or hasattr(bounds, "__array__")
+    ends = tuple(bounds) if ordered and isinstance(bounds, Iterable) else ()
     if len(ends) != 2 or not all(isinstance(e, Real) and not isinstance(e, bool) for e in ends):
         raise ParameterError(
             f"the range of '{name}' is a pair of numbers (lower, upper), got {shown(bounds)}"
@@ -219,7 +221,7 @@ def checked_range(name: str, bounds: object) -> tuple[float, float]:
     width, size = high - low, max(abs(low), abs(high))
     if not _NARROW * size <= width or not 1.0 / _WIDE <= width <= _WIDE:
         raise ParameterError(
-            f"the range of '{name}', ({low:g}, {high:g}), is {'wider' if width > 1.0 else 'narrower'} than "
+            f"the range of '{name}', ({low!r}, {high!r}), is {'wider' if width > 1.0 else 'narrower'} than "
             "steps along it can be resolved: give the part of it that is of interest"
         )
     return low, high

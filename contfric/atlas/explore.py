@@ -28,7 +28,7 @@ from contfric.continuation.branch import Branch
 from contfric.continuation.points import MOST_POINTS, Settings, settings_of
 from contfric.continuation.singular_points.vertices import symmetrised
 from contfric.continuation.trace import continue_orbit, follow_orbit
-from contfric.errors import ConvergenceError, function_of, truth, whole_number
+from contfric.errors import ConvergenceError, checked_range, function_of, truth, whole_number
 from contfric.events.bifurcation import EndReason
 from contfric.orbit.canonical.repetition import shortest
 from contfric.orbit.orbit import Orbit
@@ -119,7 +119,7 @@ def explore(
     )
     raised = f"max_periods raised to {most}: the start has that many periods"
     notes = [raised] if orbit.periods > (max_periods or MOST_PERIODS) else []
-    ends = float(range[0]), float(range[1])
+    ends = checked_range(parameter, range)
     found = _explored(orbit, settings, ends, asked, seeds, progress, notes)
     divided = with_section(orbit, found.loose_ends) if found.complete else None
     if divided is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -61,11 +62,18 @@ def left_through(model: Model, mode: str, t: float, y: FloatArray, vector: Float
     return ""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what comes of it is refused
 def start_of(
     model: Model, t: float, y: FloatArray, vector: FloatArray, domain: str | None
 ) -> tuple[int, int]:
     """Return (mode, surfaces that the start lies on and leaves, as bits) of an initial state."""
     start = StartState(model, t, y, vector)
+    if undefined := [k for k, h in start.heights.items() if not math.isfinite(h)]:
+        raise ParameterError(
+            f"how far the state {y.tolist()} at t = {t!r} is from the surface '{undefined[0]}' of "
+            f"{model.name} is no finite number: its parameters or the state are too large, or a formula "
+            "has no value there. Choose others (params, state=...)"
+        )
     exact = {k: int(np.sign(h)) for k, h in start.heights.items()} | model.settled_sides
     signs = exact | {k: 0 for k in exact if k not in model.settled_sides and start.lies_on(k)}
     given: object = domain  # whatever the user gave
@@ -165,6 +173,7 @@ def _side_of_rates(
     return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # what comes of it is refused
 def displaced(model: Model, vector: FloatArray) -> FloatArray:
     """Return the initial state by default: displaced from rest, else drawn; in a domain.
 

@@ -111,6 +111,9 @@ def test_counts_that_are_none(value: Any, orbit: cf.Orbit) -> None:
         None,
         (0.3, HUGE),
         (False, True),
+        {0.3, 0.7},
+        {0.3: 0, 0.7: 1},
+        iter((0.3, 0.7)),
     ],
     ids=shown,
 )
@@ -126,6 +129,16 @@ WIDE = [(1e-300, 1e300), (-1e308, 1e308), (0.5, 0.5 + 1e-13), (0, HUGE)]
 def test_ranges_of_a_plane_that_are_none(bounds: Any, orbit: cf.Orbit) -> None:
     ranges = {"Omega": bounds, "S": (0.1, 0.4)}
     refused(lambda: cf.explore_plane(orbit, ("Omega", "S"), ranges))
+
+
+def test_a_range_that_is_too_narrow_is_shown_with_all_digits(orbit: cf.Orbit) -> None:
+    text = refused(lambda: cf.explore(orbit, "Omega", (0.5, 0.5 + 1e-13)))
+    assert "(0.5, 0.5000000000001)" in text and "narrower" in text
+
+
+@pytest.mark.parametrize("params", [{"Omega": 1e308}, {"S0": 1e308, "h": 1e308}], ids=shown)
+def test_starts_at_which_surfaces_have_no_finite_distance(params: dict[str, float]) -> None:
+    refused(lambda: cf.find_orbit("coulomb", {**START, **params}), ContfricError)
 
 
 def test_numbers_of_numpy_are_numbers(orbit: cf.Orbit) -> None:
