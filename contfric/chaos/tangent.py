@@ -72,6 +72,8 @@ ARRIVED, BROKEN = 0, 10
 #: this factor grows without bound in a finite time (as 1/(time left) it has grown by 1e12), and one that
 #: is larger than this has grown already: levels of size 1 are rounding compared with it.
 _HALVINGS, _ESCAPES, _HUGE = 40, 1e6, 1e10
+#: Share of other states in a perturbation of one: not seen in its growth, and far above rounding.
+_OTHERS = 1e-6
 #: What a transit knows of events: how many in a row followed each other at once; what the model has; whether
 #: an impact was among them; 1 + the wall that was met last, if impacts go on alike since; how many impacts to
 #: come are known not to lead to rest.
@@ -355,7 +357,14 @@ def orthonormalise(frame, count, growth):  # type: ignore[no-untyped-def]
 
 @helper
 def seed(frame, first):  # type: ignore[no-untyped-def]
-    """Start the rows from ``first`` on as perturbations of one state each."""
+    """Start the rows from ``first`` on as perturbations of one state each, and a little of all others.
+
+    A mode of rest forgets some states, and as many rows as it keeps must survive it: so no two rows, and no
+    sums of them, have the same share of others (squares of the numbers of entries, in radians).
+    """
+    width = frame.shape[1]
     for i in range(first, frame.shape[0]):
-        for j in range(frame.shape[1]):
-            frame[i, j] = 1.0 if j == 1 + i else 0.0
+        frame[i, 0] = 0.0
+        for j in range(1, width):
+            others = _OTHERS * math.sin(float(i * width + j) ** 2)
+            frame[i, j] = 1.0 if j == 1 + i else others

@@ -198,16 +198,16 @@ def write_gradient(gradient, jac, which, share, out):  # type: ignore[no-untyped
     """Write a gradient by time, states and parameters by start, state, duration and what moves."""
     n, wide = jac.shape
     for c in range(wide):
-        value = 0.0
-        for i in range(n):
-            value += gradient[1 + i] * jac[i, c]
-        if c == 0:
-            value += gradient[0]
-        elif c == 1 + n:
-            value = share * (value + gradient[0])
-        elif c > 1 + n:
-            value += gradient[1 + n + which[c - 2 - n]]
-        out[1 + c] = value
+        out[1 + c] = 0.0
+    for i in range(n):
+        weight = gradient[1 + i]
+        if weight != 0.0:  # most expressions have few of the states
+            for c in range(wide):
+                out[1 + c] += weight * jac[i, c]
+    out[1] += gradient[0]
+    out[2 + n] = share * (out[2 + n] + gradient[0])
+    for k in range(which.shape[0]):
+        out[3 + n + k] += gradient[1 + n + which[k]]
     out[1 + wide] = gradient[gradient.shape[0] - 1]
 
 
