@@ -16,6 +16,7 @@ import numpy as np
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError, number_and
 from contfric.models.check.period import undeclared_angles
 from contfric.models.check.probe import Probe
+from contfric.models.check.translations import of_translation, translations
 from contfric.models.definition import Model
 from contfric.models.mode_domains import open_ends
 from contfric.models.shorthand.clocks import is_clock
@@ -39,6 +40,8 @@ _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
 #: Weak chaos is seen late, so a share of the periods that were simulated is compared, up to so many times
 #: more. An exponent of 0.005 where the frequency is 0.5 is seen after 200 periods.
 _SHARE, _LONGER = 0.1, 20
+#: What is left of states that have moved on, without that, as a share of them.
+_REST = 0.1
 #: Growth of states after which their events are rounding.
 _FAR = 1e12
 #: A simulation that ends on a surface is on it to rounding, or a little more at a small angle.
@@ -117,10 +120,24 @@ def outgrown(trajectory: Trajectory) -> str:
 def _unbounded(trajectory: Trajectory) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     size = float(np.max(np.abs(trajectory.states[-1])))
+    if text := _moves_on(trajectory):
+        return f"no periodic orbit: the solution at {where} moves on (to {size:.3g} so far): {text}"
     return (
         f"no periodic orbit: the solution at {where} grows without bound (to {size:.3g} so far), as at "
         f"a resonance with too little damping{out_of_range(trajectory)}. Choose other parameters"
     )
+
+
+def _moves_on(trajectory: Trajectory) -> str:
+    """Return which states a solution has moved on in that nothing depends on; nothing if others grow."""
+    probe, last = Probe(trajectory.model, trajectory.params), trajectory.states[-1]
+    if not trajectory.model.definition or not (directions := translations(probe)):
+        return ""
+    along = np.array(directions).T
+    shares = np.linalg.lstsq(along, last, rcond=None)[0]
+    if np.max(np.abs(last - along @ shares)) > _REST * np.max(np.abs(last)):
+        return ""
+    return of_translation(probe, directions[int(np.argmax(np.abs(shares)))])
 
 
 def out_of_range(trajectory: Trajectory) -> str:
