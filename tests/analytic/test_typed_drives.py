@@ -64,3 +64,80 @@ def test_pieces_that_do_not_meet_after_a_turn_are_refused(tmp_path: Path, turn: 
     *others, last = TURNS[turn]
     findings = cf.check_model(typed(tmp_path, written(*others, f"{last} + 0.1"))).findings
     assert any("that is no angle" in str(f) for f in findings)
+
+
+CAPSULE = """
+name: capsule
+states: [r, y1, y2]
+parameters: {w: 0.95, a: 1.5, zeta: 0.01, delta: 0.02, beta: 15.0, g: 2.5, f: 1.0}
+period: 2*pi/w
+define: {k: "2*zeta*(y2 - y1) - r - where(r > delta, beta*(r - delta), 0)"}
+surfaces:
+  contact: {observable: r, level: delta}
+  slide: {observable: y2, sliding: filippov}
+field: {r: y1 - y2, y1: a*cos(w*t) + k, y2: (-f*sign(y2) - k)/g}
+"""
+CRAWLS = """
+name: crawls
+states: [x1, x2, y1, y2]
+parameters: {w: 0.95, a: 1.5, zeta: 0.1, g: 2.5, f: 1.0, slope: 0.3}
+period: 2*pi/w
+define: {k: 2*zeta*(y2 - y1) - x1 + x2}
+surfaces: {slide: {observable: y2, sliding: filippov}}
+field: {x1: y1, x2: y2, y1: a*cos(w*t) + k, y2: (slope - f*sign(y2) - k)/g}
+"""
+
+
+def test_what_crawls_is_told_to_be_written_by_its_relative_position(tmp_path: Path) -> None:
+    """The capsule of Liu, Wiercigroch and Pavlovskaia (2013) on a slope: it was called resonance."""
+    model = typed(tmp_path, CRAWLS)
+    (found,) = cf.check_model(model).findings
+    assert "the same at x1 + c, x2 + c, whatever c is" in str(found)
+    with pytest.raises(cf.ConvergenceError, match=r"moves on .* x1 \+ c, x2 \+ c"):
+        cf.find_orbit(model)
+
+
+def crawled(params: dict[str, float], start: tuple[float, ...], span: float) -> list[float]:
+    """Return (r, y1, y2) after a time, from one in which the capsule moves: from event to event."""
+    w, a, zeta, delta, beta, g, f = (
+        params[n] for n in ("w", "a", "zeta", "delta", "beta", "g", "f")
+    )
+
+    def pull(y: list[float]) -> float:
+        return 2.0 * zeta * (y[2] - y[1]) - y[0] - (beta * (y[0] - delta) if y[0] > delta else 0.0)
+
+    t, y, end = start[0], list(start[1:]), start[0] + span
+    way = math.copysign(1.0, y[2])
+    while t < end:
+
+        def rates(t: float, y: list[float], way: float = way) -> list[float]:
+            k = pull(y)
+            return [y[1] - y[2], a * math.cos(w * t) + k, (-f * way - k) / g if way else 0.0]
+
+        events = [lambda _, y: abs(pull(y)) - f] if way == 0.0 else [lambda _, y: y[2]]
+        events[0].terminal, events[0].direction = True, 1.0 if way == 0.0 else -way
+        tight = {"rtol": 1e-10, "atol": 1e-11, "max_step": 0.01}
+        found = solve_ivp(rates, (t, end), y, events=events, **tight)
+        t, y = found.t[-1], found.y[:, -1].tolist()
+        if t < end:
+            y[2] = 0.0
+            force = -pull(y)
+            way = math.copysign(1.0, force) if way == 0.0 or abs(force) > f else 0.0
+    return y
+
+
+@pytest.mark.parametrize(("beta", "low"), [(15.0, 1.5), (40.0, 1.1)])
+def test_a_capsule_slips_through_where_rest_is_passed(
+    tmp_path: Path, beta: float, low: float
+) -> None:
+    """In contact no state is near the lower limit of rest: what is there was told from out of contact.
+
+    The event at which the capsule rests no more was GS on one of its branches, and CS on the other.
+    """
+    model = typed(tmp_path, CAPSULE)
+    orbit = cf.find_orbit(model, {"beta": beta, "a": 1.7})
+    start = next(j for j in orbit.joints if abs(j[3]) > 1e-3)
+    assert crawled(orbit.params, start, orbit.period) == pytest.approx(start[1:], abs=1e-6)
+    diagram = cf.explore(orbit, "a", (low, 1.8))
+    assert {b.kind for b in diagram.bifurcations} == {cf.Kind.CS}
+    assert diagram.verify().same

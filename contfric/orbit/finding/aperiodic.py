@@ -40,7 +40,7 @@ _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
 #: Weak chaos is seen late, so a share of the periods that were simulated is compared, up to so many times
 #: more. An exponent of 0.005 where the frequency is 0.5 is seen after 200 periods.
 _SHARE, _LONGER = 0.1, 20
-#: What is left of states that have moved on, without that, as a share of them.
+#: What a solution that moves on may change besides, as a share of how far it moves.
 _REST = 0.1
 #: Growth of states after which their events are rounding.
 _FAR = 1e12
@@ -68,7 +68,7 @@ def why_none(
     if slow is not None:
         return ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
     if _grows(trajectory):
-        return ConvergenceError(_unbounded(trajectory), trajectory)
+        return ConvergenceError(drifts(trajectory, _LEAST) or _unbounded(trajectory), trajectory)
     text = _advice(trajectory, done) + (_parting(trajectory, done) if compared else "")
     return AperiodicError(text, trajectory)
 
@@ -89,6 +89,25 @@ def goes_round(trajectory: Trajectory, done: int) -> str:
                 f"far), and is no angle of the model. If it is one, {text}"
             )
     return ""
+
+
+def drifts(trajectory: Trajectory, done: int) -> str:
+    """Return which states a solution moves on in that nothing depends on; nothing if it does not."""
+    model, states = trajectory.model, trajectory.states[len(trajectory) // 2 :]
+    if done < _LEAST or len(states) < 2 or not model.definition:
+        return ""
+    moved = states[-1] - states[0]
+    steps = np.max(np.abs(np.diff(states, axis=0)), axis=0)
+    if not np.any(np.abs(moved) > _TURNS * steps):
+        return ""
+    probe = Probe(model, trajectory.params)
+    directions = translations(probe)
+    along = np.array(directions).T
+    shares = np.linalg.lstsq(along, moved, rcond=None)[0] if directions else np.zeros(1)
+    if not np.any(shares) or np.max(np.abs(moved - along @ shares)) > _REST * np.max(np.abs(moved)):
+        return ""
+    text = of_translation(probe, directions[int(np.argmax(np.abs(shares)))])
+    return f"no periodic orbit: the solution moves on (to {np.max(np.abs(states[-1])):.3g} so far): {text}"
 
 
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
@@ -120,24 +139,10 @@ def outgrown(trajectory: Trajectory) -> str:
 def _unbounded(trajectory: Trajectory) -> str:
     where = ", ".join(f"{k} = {v:g}" for k, v in trajectory.params.items())
     size = float(np.max(np.abs(trajectory.states[-1])))
-    if text := _moves_on(trajectory):
-        return f"no periodic orbit: the solution at {where} moves on (to {size:.3g} so far): {text}"
     return (
         f"no periodic orbit: the solution at {where} grows without bound (to {size:.3g} so far), as at "
         f"a resonance with too little damping{out_of_range(trajectory)}. Choose other parameters"
     )
-
-
-def _moves_on(trajectory: Trajectory) -> str:
-    """Return which states a solution has moved on in that nothing depends on; nothing if others grow."""
-    probe, last = Probe(trajectory.model, trajectory.params), trajectory.states[-1]
-    if not trajectory.model.definition or not (directions := translations(probe)):
-        return ""
-    along = np.array(directions).T
-    shares = np.linalg.lstsq(along, last, rcond=None)[0]
-    if np.max(np.abs(last - along @ shares)) > _REST * np.max(np.abs(last)):
-        return ""
-    return of_translation(probe, directions[int(np.argmax(np.abs(shares)))])
 
 
 def out_of_range(trajectory: Trajectory) -> str:
