@@ -9,6 +9,7 @@ quasi-periodic one.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -32,6 +33,9 @@ MOST, _LEAST = 50_000, 1_000
 _WORK = 2e6
 #: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
 _GROWTH = 2.0
+#: Slower growth, as of a relay with a lag (the square root of time): each of so many parts is larger than the
+#: one before, and all together by this factor. A quasi-periodic solution comes back.
+_PARTS, _SLOWLY = 10, 1.2
 #: Turns within the last half of a simulation, of a solution that goes round for good.
 _TURNS = 8
 #: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
@@ -198,10 +202,23 @@ def _parting(trajectory: Trajectory, done: int) -> str:
             f". Solutions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it "
             "is chaotic, or a long transient of chaos"
         )
-    return (
-        f". Solutions that begin close stay close for {compared} periods: it is quasi-periodic, or it "
-        "converges slowly"
-    )
+    close = f". Solutions that begin close stay close for {compared} periods: it"
+    if (growth := _slow_growth(trajectory)) > _SLOWLY:
+        return (
+            f"{close} grows, by a factor {growth:.3g} in the last {len(trajectory)} events, without bound or "
+            "to an orbit far away"
+        )
+    return f"{close} is quasi-periodic, or it converges slowly"
+
+
+def _slow_growth(trajectory: Trajectory) -> float:
+    """Return the factor by which the last stretch of a simulation grows, each tenth of it; else 1."""
+    if len(trajectory) < _PARTS**2:
+        return 1.0
+    size = np.max(np.abs(trajectory.states), axis=1)
+    largest = [float(np.max(part)) for part in np.array_split(size, _PARTS)]
+    grows = all(a < b for a, b in itertools.pairwise(largest))
+    return largest[-1] / largest[0] if grows and largest[0] > 0.0 else 1.0
 
 
 def goes_on(trajectory: Trajectory) -> str:
