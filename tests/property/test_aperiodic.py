@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from typed import typed
 
 import contfric as cf
 from contfric.orbit.finding.aperiodic import MOST, affordable, why_none
@@ -43,3 +44,25 @@ def test_weak_chaos_is_not_called_quasi_periodic(omega, friction) -> None:
 def test_a_large_structure_that_is_chaotic_is_called_so_in_seconds() -> None:
     with pytest.raises(cf.AperiodicError, match=r"found in 1\d\d\d periods.*it is chaotic"):
         cf.find_orbit("beam-stop", {"W": 6.1})
+
+
+LAG = """
+name: lag
+states: [x, v, u]
+parameters: {tau: 0.5, k: 0.3}
+autonomous: true
+surfaces: {switch: {observable: x + k*v}}
+modes:
+  plus: {in: {switch: -}, field: {x: v, v: u, u: (1 - u)/tau}}
+  minus: {in: {switch: +}, field: {x: v, v: u, u: (-1 - u)/tau}}
+"""
+
+
+@pytest.mark.parametrize("k", [0.1, 0.3, 0.45])
+def test_slow_growth_is_not_called_quasi_periodic(tmp_path, k: float) -> None:
+    """A switch is late by d = tau - k: v grows by 2 d there, and the way back takes 2 v. So v^2 = 2 d t."""
+    model = typed(tmp_path, LAG)
+    trajectory = cf.simulate(model, {"k": k}, state=(10, 0, 0), periods=20_000)
+    assert trajectory.states[-1, 1] ** 2 == pytest.approx(2.0 * (0.5 - k) * 20_000, rel=0.05)
+    error = str(why_none(trajectory, 20_000, None, compared=True))
+    assert "grows" in error and "quasi-periodic" not in error

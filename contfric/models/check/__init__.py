@@ -59,12 +59,12 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_two_folds,
     )
     from contfric.models.check.passages import check_passages, check_slides
+    from contfric.models.check.period import check_angles
     from contfric.models.check.probe import Probe
     from contfric.models.check.reached import check_reached, check_resets_met
     from contfric.models.check.roots import check_roots
     from contfric.models.check.scales import check_scales
     from contfric.models.check.structure import (
-        check_angles,
         check_period,
         check_resets,
         check_sliding,
@@ -72,6 +72,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
         check_symmetry,
         check_transitions,
     )
+    from contfric.models.check.translations import check_translations
     from contfric.models.deriving.growing_model import ComposedModel, composed_from
     from contfric.models.tied import tied
 
@@ -104,6 +105,7 @@ def check_model(model: ModelSource, params: dict[str, float] | None = None) -> M
     check_hidden(report, probe)
     check_period(report, probe)
     check_angles(report, probe)
+    check_translations(report, probe)
     check_reached(report, probe)
     check_resets_met(report, probe)
     check_scales(report, probe)

@@ -8,12 +8,7 @@ import numpy as np
 
 from contfric.base.arrays import FloatArray
 from contfric.models.check.passages import check_left, crossed_limits, other_side
-from contfric.models.check.period import (
-    changed_after_a_period,
-    not_periodic,
-    repeats_sooner,
-    undeclared_angles,
-)
+from contfric.models.check.period import changed_after_a_period, not_periodic, repeats_sooner
 from contfric.models.check.probe import Probe
 from contfric.models.check.reached import report_fault
 from contfric.models.check.report import ModelReport, Topic
@@ -366,31 +361,6 @@ def check_period(report: ModelReport, probe: Probe) -> None:
                 return
     if text := repeats_sooner(probe):
         report.warn(Topic.PERIOD, text)
-
-
-def check_angles(report: ModelReport, probe: Probe) -> None:
-    """Check that fields are the same a turn of an angle later, and look for angles that are not declared."""
-    model = probe.model
-    for state, text in undeclared_angles(probe).items():
-        report.note(
-            Topic.UNDECLARED,
-            f"the fields are the same a turn (2 pi) of '{state}' later: if it is an angle, {text}",
-        )
-    for state in {
-        s for reset in model.resets if reset.wraps for s in model.states if s in reset.changes
-    }:
-        turn = 2.0 * np.pi * np.array([float(s == state) for s in model.states])
-        for t, y in probe.states(_EVERYWHERE // 10):
-            report.count(Topic.PERIOD)
-            for mode in model.modes:
-                here, there = (probe.field(mode.name, t, at) for at in (y, y + turn))
-                if not np.allclose(here, there, rtol=_SAME, atol=_SAME):
-                    report.error(
-                        Topic.PERIOD,
-                        f"the field of '{mode.name}' is not the same a turn of '{state}' later: that is no "
-                        f"angle. A saw-tooth is a surface '{state} = pi' with a reset '{state} - 2*pi'",
-                    )
-                    return
 
 
 def _sides(model: Model, signs: dict[str, int]) -> str:

@@ -154,8 +154,9 @@ def _limit_side(
 
     Sliding ends where the field of one side leads to the surface no more, while that of the other still does:
     its rate is zero at the limit, or has another sign (a static limit above the kinetic one). Places where
-    the mode holds tell; where no random state comes to one, all places at the limit, if they agree. Where
-    no place at the limit is found (at the defaults a contact never slips), the limit may be that rate itself.
+    the mode holds tell. Where no random state comes to one (at the defaults a contact never slips), the limit
+    may be that rate itself. Else all places at the limit tell, if they agree: elsewhere a formula with kinks
+    is not the field of the mode.
 
     Parameters
     ----------
@@ -176,9 +177,10 @@ def _limit_side(
             if len(inward) != 1 or not all(np.isfinite(outward).flat):
                 continue
             verdicts[other.sides(*place, others) == others].add(-inward[0])
-    told = verdicts[True] or verdicts[False]
-    if not told:
-        return _vanishing_side(sampler, known, pair, apart)
+    told = verdicts[True]
+    if not told and (side := _vanishing_side(sampler, known, pair, apart)):
+        return side
+    told = told or verdicts[False]
     return told.pop() if len(told) == 1 else 0
 
 
@@ -192,7 +194,9 @@ def _vanishing_side(
     """
     on, limit = pair
     found = {1, -1}
-    for t, y in sampler.on(on, {}, _PLACES):
+    others = {name: side for name, side in known.items() if name not in pair}
+    places = list(sampler.on(on, others, _PLACES)) or sampler.on(on, {}, _PLACES)
+    for t, y in places:
         height = known[limit] * sampler.evaluator.height(limit, sampler.params, t, y)
         rates = {side: side * sampler.rate(apart[side < 0], on, side, t, y) for side in found}
         found = {s for s, rate in rates.items() if abs(rate + height) <= _STILL * (1.0 + abs(rate))}

@@ -9,6 +9,7 @@ quasi-periodic one.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from contfric.errors import AperiodicError, ConvergenceError, ParameterError, number_and
 from contfric.models.check.period import undeclared_angles
 from contfric.models.check.probe import Probe
+from contfric.models.check.translations import of_translation, translations
 from contfric.models.definition import Model
 from contfric.models.mode_domains import open_ends
 from contfric.models.shorthand.clocks import is_clock
@@ -31,6 +33,9 @@ MOST, _LEAST = 50_000, 1_000
 _WORK = 2e6
 #: Growth over the last stretch (three quarters of the whole simulation) that no settling motion has.
 _GROWTH = 2.0
+#: Slower growth, as of a relay with a lag (the square root of time): each of so many parts is larger than the
+#: one before, and all together by this factor. A quasi-periodic solution comes back.
+_PARTS, _SLOWLY = 10, 1.2
 #: Turns within the last half of a simulation, of a solution that goes round for good.
 _TURNS = 8
 #: Two motions that begin this far apart (relative to 1 + the states) are compared after some periods; they
@@ -39,6 +44,8 @@ _APART, _COMPARED, _CHAOTIC = 1e-9, 100, 1e3
 #: Weak chaos is seen late, so a share of the periods that were simulated is compared, up to so many times
 #: more. An exponent of 0.005 where the frequency is 0.5 is seen after 200 periods.
 _SHARE, _LONGER = 0.1, 20
+#: What a solution that moves on may change besides, as a share of how far it moves.
+_REST = 0.1
 #: Growth of states after which their events are rounding.
 _FAR = 1e12
 #: A simulation that ends on a surface is on it to rounding, or a little more at a small angle.
@@ -65,7 +72,7 @@ def why_none(
     if slow is not None:
         return ConvergenceError(_marginal(trajectory, done, *slow[1:]), trajectory)
     if _grows(trajectory):
-        return ConvergenceError(_unbounded(trajectory), trajectory)
+        return ConvergenceError(drifts(trajectory, _LEAST) or _unbounded(trajectory), trajectory)
     text = _advice(trajectory, done) + (_parting(trajectory, done) if compared else "")
     return AperiodicError(text, trajectory)
 
@@ -86,6 +93,25 @@ def goes_round(trajectory: Trajectory, done: int) -> str:
                 f"far), and is no angle of the model. If it is one, {text}"
             )
     return ""
+
+
+def drifts(trajectory: Trajectory, done: int) -> str:
+    """Return which states a solution moves on in that nothing depends on; nothing if it does not."""
+    model, states = trajectory.model, trajectory.states[len(trajectory) // 2 :]
+    if done < _LEAST or len(states) < 2 or not model.definition:
+        return ""
+    moved = states[-1] - states[0]
+    steps = np.max(np.abs(np.diff(states, axis=0)), axis=0)
+    if not np.any(np.abs(moved) > _TURNS * steps):
+        return ""
+    probe = Probe(model, trajectory.params)
+    directions = translations(probe)
+    along = np.array(directions).T
+    shares = np.linalg.lstsq(along, moved, rcond=None)[0] if directions else np.zeros(1)
+    if not np.any(shares) or np.max(np.abs(moved - along @ shares)) > _REST * np.max(np.abs(moved)):
+        return ""
+    text = of_translation(probe, directions[int(np.argmax(np.abs(shares)))])
+    return f"no periodic orbit: the solution moves on (to {np.max(np.abs(states[-1])):.3g} so far): {text}"
 
 
 def _marginal(trajectory: Trajectory, done: int, turns: int, mismatch: float) -> str:
@@ -176,10 +202,23 @@ def _parting(trajectory: Trajectory, done: int) -> str:
             f". Solutions that begin {_APART:.0e} apart are {apart:.0e} apart after {compared} periods: it "
             "is chaotic, or a long transient of chaos"
         )
-    return (
-        f". Solutions that begin close stay close for {compared} periods: it is quasi-periodic, or it "
-        "converges slowly"
-    )
+    close = f". Solutions that begin close stay close for {compared} periods: it"
+    if (growth := _slow_growth(trajectory)) > _SLOWLY:
+        return (
+            f"{close} grows, by a factor {growth:.3g} in the last {len(trajectory)} events, without bound or "
+            "to an orbit far away"
+        )
+    return f"{close} is quasi-periodic, or it converges slowly"
+
+
+def _slow_growth(trajectory: Trajectory) -> float:
+    """Return the factor by which the last stretch of a simulation grows, each tenth of it; else 1."""
+    if len(trajectory) < _PARTS**2:
+        return 1.0
+    size = np.max(np.abs(trajectory.states), axis=1)
+    largest = [float(np.max(part)) for part in np.array_split(size, _PARTS)]
+    grows = all(a < b for a, b in itertools.pairwise(largest))
+    return largest[-1] / largest[0] if grows and largest[0] > 0.0 else 1.0
 
 
 def goes_on(trajectory: Trajectory) -> str:

@@ -17,6 +17,7 @@ from contfric.orbit.finding.aperiodic import (
     MOST,
     MOST_PERIODS,
     affordable,
+    drifts,
     goes_on,
     goes_round,
     left_region,
@@ -232,7 +233,9 @@ class _Search:
         if orbit is None and final:
             slow = next((r for r in recurrences(trajectory) if r[2] < _CREEPING), None)
             raise why_none(trajectory, self.done, slow, compared=self.longest is None)
-        if orbit is None and (why := goes_round(trajectory, self.done)):
+        if orbit is None and (
+            why := goes_round(trajectory, self.done) or drifts(trajectory, self.done)
+        ):
             raise ConvergenceError(why, trajectory)
         return orbit
 
