@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import contfric as cf
 from contfric.models.deriving.growing_model import ComposedModel
@@ -118,6 +119,42 @@ def test_ten_contacts_in_units_load_at_once() -> None:
     )
     assert dict(model.units)["q1"] == dict(model.units)["q10"] < 1e-3
     assert time.process_time() - begun < 5.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_check_proposes_units_that_it_accepts(seed: int) -> None:
+    def proposed(model: cf.Mechanism) -> Any:
+        texts = [str(f) for f in cf.check_model(model).findings if "Write units: " in str(f)]
+        return yaml.safe_load(texts[0].partition("Write units: ")[2]) if texts else {}
+
+    units = proposed(structure(drawn(seed), None))
+    assert units
+    assert not proposed(structure(drawn(seed), units))
+    assert not proposed(structure((1.0,) * 3, None))
+
+
+def test_a_search_that_fails_in_small_numbers_says_units() -> None:
+    """A start of 1 m is far beyond a gap of 70 micrometres: that was called chatter, and no more."""
+    pad = {"kind": "friction", "velocity": "v1", "kinetic": "R"}
+    wall = {"kind": "impact", "gap": "7e-5 - q2", "restitution": 0.5}
+    contacts = {"wall": wall, "pad": pad}
+    given: dict[str, Any] = {
+        "force": {"q1": "F*cos(w*t)"},
+        "parameters": {"F": 180.0, "w": 800.0, "R": 40.0},
+        "period": "2*pi/w",
+    }
+    stiffness = 2e6 * np.array([[2.0, -1.0], [-1.0, 1.5]])
+    matrices = 2.0 * np.eye(2), 120.0 * np.eye(2), stiffness
+    with pytest.raises(cf.ConvergenceError, match="units: auto"):
+        cf.find_orbit(cf.Mechanism(*matrices, contacts=contacts, **given))
+    found = cf.find_orbit(cf.Mechanism(*matrices, contacts=contacts, **given, units="auto"))
+    ones = np.eye(2), 0.06 * np.eye(2), 0.5e-6 * stiffness
+    contacts["wall"] = wall | {"gap": "0.7 - q2"}
+    given["parameters"] = {"F": 0.9, "w": 0.8, "R": 0.2}
+    wanted = cf.find_orbit(cf.Mechanism(*ones, contacts=contacts, **given))
+    assert np.sort_complex(found.multipliers) == pytest.approx(
+        np.sort_complex(wanted.multipliers), abs=1e-9
+    )
 
 
 def test_coordinates_that_share_contacts_have_one_unit() -> None:

@@ -36,11 +36,12 @@ def describe(data: Mapping[str, Any]) -> Description:
 
     given = checked(data)
     if COORDINATES in given:
-        given = checked(with_contacts(structure_in_units(given, _read)))
-    return expanded(given, _read)
+        given = checked(with_contacts(structure_in_units(given, read_plain)))
+    return expanded(given, read_plain)
 
 
-def _read(plain: Mapping[str, Any]) -> Description:
+def read_plain(plain: Mapping[str, Any]) -> Description:
+    """Return the description of data in which nothing is said in short, checked against the schema."""
     from contfric.models.reading.schema import checked
 
     return _described(checked(plain))

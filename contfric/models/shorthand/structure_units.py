@@ -65,9 +65,7 @@ def _units(structure: Structure, read: Read) -> dict[str, float]:
     """Return the units of coordinates, velocities, stretches and time."""
     given, names = structure.data[KEY], structure.coordinates
     if AUTO in given:
-        chosen = chosen_units(
-            read(_smooth(structure)), structure.data["spread"], (), ([*names], structure.velocities)
-        )
+        chosen = natural_units(structure, read)
         given = {q: chosen[q] for q in names} | {TIME: chosen[TIME]}
     known_keys(given, (*names, TIME), (KEY,))
     lengths, time = {given.get(q, 1.0) for q in names}, given.get(TIME, 1.0)
@@ -85,6 +83,19 @@ def _units(structure: Structure, read: Read) -> dict[str, float]:
     }
 
 
+def natural_units(structure: Structure, read: Read) -> dict[str, float]:
+    """Return what forces move coordinates and velocities by, the largest of each, and the time in which.
+
+    Raises
+    ------
+    EntryError
+        If nothing moves them.
+    """
+    alike = [*structure.coordinates], structure.velocities
+    known = structure.data.get("spread", {})  # what a visited mode is made from has none
+    return chosen_units(read(_smooth(structure)), known, (), alike)
+
+
 def _smooth(structure: Structure) -> dict[str, Any]:
     """Return the structure as a model in which all friction slides up, and nothing else acts."""
     data, names = structure.data, structure.coordinates
@@ -97,7 +108,7 @@ def _smooth(structure: Structure) -> dict[str, Any]:
     field |= {v: moved.get(i, "0") for i, v in enumerate(structure.velocities)}
     own = ("name", "parameters", "define", "period", "autonomous")
     kept = {key: data[key] for key in own if key in data}
-    spread = {name: data["spread"][name] for name in field if name in data["spread"]}
+    spread = {name: size for name, size in data.get("spread", {}).items() if name in field}
     mode = {"smooth": {"in": {}, "field": field}}
     return {**kept, "states": [*field], "modes": mode, "spread": spread}
 

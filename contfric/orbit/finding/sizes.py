@@ -13,6 +13,8 @@ from contextlib import contextmanager
 import numpy as np
 
 from contfric.errors import ConvergenceError
+from contfric.models.check.probe import Probe
+from contfric.models.check.scales import forced_sizes
 from contfric.orbit.orbit import Orbit
 from contfric.simulation.simulate import Trajectory
 
@@ -59,17 +61,19 @@ def sizes_told() -> Iterator[None]:
         if not isinstance(found, Trajectory) or found.model.units or not (far := _far(found)):
             raise
         raise type(error)(
-            f"{error}. Before that, {' and '.join(far)}, far from 1, may be the reason: such numbers are solved "
-            "in units of their own. Write 'units: auto' into the model (units=\"auto\" in Python)",
+            f"{error}. The reason may be that numbers are far from 1 ({' and '.join(far)}): write "
+            "'units: auto' into the model (units=\"auto\" in Python) first",
             found,
         ) from None
 
 
 def _far(trajectory: Trajectory) -> list[str]:
-    """Return what is far from 1 in the last half of a simulation: what it comes to, not where it begins."""
-    model = trajectory.model
+    """Return what is far from 1: what the excitation moves states by, else what they end at; the period."""
+    model, probe = trajectory.model, Probe(trajectory.model, trajectory.params)
     late = np.abs(trajectory.states[len(trajectory) // 2 :])
-    size, far = float(late.max()) if late.size else 0.0, []
+    size, far = max(forced_sizes(probe).values(), default=0.0), []
+    if size == 0.0 and late.size:
+        size = float(late.max())
     if size > 0.0 and not 1.0 / _FAR < size < _FAR:
         far.append(f"states of {size:.1g}")
     period = model.view(model.vector(trajectory.params)).period / math.tau
