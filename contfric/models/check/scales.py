@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 
 from contfric.models.check.probe import Probe
 from contfric.models.check.report import ModelReport, Topic
+from contfric.models.deriving.growing_model import ComposedModel
+from contfric.models.entries import EntryError
+from contfric.models.reading.describe import read_plain
 from contfric.models.shorthand.clocks import is_clock
+from contfric.models.shorthand.structure_units import natural_units
 
 #: Sizes of states, or times in which they change, that are this far apart: Newton's method and distances in
 #: a diagram weigh all states alike.
@@ -35,10 +40,10 @@ def check_scales(report: ModelReport, probe: Probe) -> None:
         for mode in model.modes
         for place in probe.places(mode.name, _STATES)
     ]
-    if not rates:
+    if not rates and not isinstance(model, ComposedModel):
         return
     report.count(Topic.SCALES)
-    fastest = np.max(rates, axis=0)
+    fastest = np.max(rates, axis=0) if rates else np.zeros(len(widths))
     times = {
         state: float(width / rate)
         for state, width, rate in zip(model.states, widths, fastest, strict=True)
@@ -59,8 +64,8 @@ def _propose_units(
     shift = probe.period / math.tau if probe.period else typical
     if "clock" in sizes:  # the time since the last tick: half a period is its spread
         shift = sizes["clock"] / math.pi
-    for state, size in _forced_sizes(probe).items():
-        if sizes[state] == 1.0 and size > _NO_FORCE:  # nobody has said how large it is
+    for state, size in forced_sizes(probe).items():
+        if sizes.get(state) == 1.0 and size > _NO_FORCE:  # nobody has said how large it is
             sizes[state] = size
     angles = {n[:-1] for n in model.reset_by_surface if n[:-1] in sizes}
     wanted = {n: v for n, v in sizes.items() if not is_clock(n) and n not in angles} | {"t": shift}
@@ -70,6 +75,11 @@ def _propose_units(
     if not far or not all(v > 0.0 for v in far.values()):
         return
     given = dict(model.units)
+    if isinstance(
+        model, ComposedModel
+    ):  # velocities and stretches follow from the one unit of length
+        names = model.composition.structure.coordinates
+        wanted = dict.fromkeys(names, max(wanted[q] for q in names)) | {"t": wanted["t"]}
     units = {n: 1.0 for n, v in wanted.items() if v > 0.0} | given
     line = ", ".join(
         f"{n}: {_rounded(v * units[n])}"
@@ -97,9 +107,16 @@ def _rounded(value: float) -> str:
     return f"{float(text):.1f}" if 0.1 <= value < 1e4 else text.replace("e", ".0e")
 
 
-def _forced_sizes(probe: Probe) -> dict[str, float]:
+def forced_sizes(probe: Probe) -> dict[str, float]:
     """Return how far an excitation alone moves each state of the first mode that does not slide."""
     model, n = probe.model, len(probe.model.states)
+    if isinstance(
+        model, ComposedModel
+    ):  # its mode, before others are visited, is the one that sticks
+        with suppress(EntryError):
+            found = natural_units(model.composition.structure, read_plain)
+            return {state: found[state] for state in model.states if state in found}
+        return {}
     moving = [mode.name for mode in model.modes if not mode.sliding]
     if not probe.period or not moving:
         return {}

@@ -16,6 +16,7 @@ from contfric.models.entries import EntryError, known_keys, known_sides, one_of
 from contfric.models.language.names import Names
 from contfric.models.parts import Chatter, Departure, Observable, Parameter
 from contfric.models.shorthand.clocks import TICK
+from contfric.models.shorthand.structure_units import structure_in_units
 from contfric.models.shorthand.written_out import expanded
 from contfric.models.structures.contact_laws import ContactLaws, check_laws
 from contfric.models.structures.contact_modes import with_contacts
@@ -35,8 +36,15 @@ def describe(data: Mapping[str, Any]) -> Description:
 
     given = checked(data)
     if COORDINATES in given:
-        given = checked(with_contacts(given))
-    return expanded(given, lambda plain: _described(checked(plain)))
+        given = checked(with_contacts(structure_in_units(given, read_plain)))
+    return expanded(given, read_plain)
+
+
+def read_plain(plain: Mapping[str, Any]) -> Description:
+    """Return the description of data in which nothing is said in short, checked against the schema."""
+    from contfric.models.reading.schema import checked
+
+    return _described(checked(plain))
 
 
 def _described(data: dict[str, Any]) -> Description:

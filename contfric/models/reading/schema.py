@@ -295,6 +295,12 @@ class WrittenMode(Mode):
     derived: Flag = None
 
 
+class WrittenStructure(StructureFile):
+    """A structure in units, of a model that is written out."""
+
+    in_units: Units = EMPTY
+
+
 class WrittenOut(ModelFile):
     """A model with all that is derived from what is said in short."""
 
@@ -307,7 +313,7 @@ class WrittenOut(ModelFile):
     measured_from: Expressions = EMPTY
     alike: list[Texts] = NOTHING
     phase: Text = ""
-    structure: StructureFile | None = None
+    structure: WrittenStructure | None = None
 
 
 def checked(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -101,8 +101,9 @@ def rest_of(structure: Structure, contact: Contact) -> dict[str, str]:
     fixed = contact.kind is ContactKind.FRICTION and is_at_rest(contact)
     if not (fixed or contact.kind is ContactKind.JENKINS):
         return {}
-    parts = [times(repr(w), structure.coordinates[i]) for i, w in contact.direction.items()]
-    stretch = [] if fixed else [f"-{contact.name}"]
+    unit = structure.length
+    parts = [times(repr(unit * w), structure.coordinates[i]) for i, w in contact.direction.items()]
+    stretch = [] if fixed else [f"-{times(repr(unit), contact.name)}"]
     return {"rest": summed([*parts, *stretch]), **({"at": contact.at} if contact.at else {})}
 
 
@@ -116,7 +117,8 @@ def law_of(structure: Structure, contact: Contact, states: Mapping[str, str]) ->
         return force, "0"
     friction = contact.kind is ContactKind.FRICTION
     velocity = contact.texts["velocity"] if friction else structure.speed(contact)
-    return force, f"-({times(force, velocity)})"
+    power = times(force, velocity)
+    return force, f"-({power if structure.length == 1.0 else times(repr(structure.length), power)})"
 
 
 def check_laws(laws: tuple[ContactLaws, ...], names: Names, timed: bool) -> None:

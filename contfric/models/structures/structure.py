@@ -109,7 +109,12 @@ class Structure:
     def _made_when_visited(self) -> bool:
         """Whether modes can be made when a solution visits them."""
         numbers = set(defaults_of(self.data)) == set(self.data["parameters"])
-        return numbers and not self.data["units"] and not self._has_impacts
+        return numbers and not self._has_impacts
+
+    @property
+    def length(self) -> float:
+        """The unit of its coordinates, if it is in units."""
+        return float(self.data.get("in_units", {}).get(self.coordinates[0], 1.0))
 
     @cached_property
     def loads(self) -> SharedLoads:
@@ -131,7 +136,7 @@ class Structure:
 
     @property
     def _why_listed(self) -> str:
-        return "impacts" if self._has_impacts else "units, or parameters that follow others"
+        return "impacts" if self._has_impacts else "parameters that follow others"
 
     def check_count(self) -> None:
         """Refuse more modes than can be listed."""
@@ -153,7 +158,7 @@ class Structure:
             raise EntryError(
                 ("contacts", other.name),
                 f"the loads of '{pair.name}' and '{other.name}' depend on each other (W . M^-1 W' is not 0); "
-                f"that is for models without impacts, units, and parameters that follow others, and here are "
+                f"that is for models without impacts, and parameters that follow others, and here are "
                 f"{self._why_listed}. Friction on masses of their own, or Jenkins elements, are for all",
             )
 

@@ -38,7 +38,7 @@ from contfric.orbit.finding.rest import (
     without_an_end,
 )
 from contfric.orbit.finding.simultaneous import in_order
-from contfric.orbit.finding.sizes import warn_of_hits_together, warn_of_sizes
+from contfric.orbit.finding.sizes import sizes_told, warn_of_hits_together, warn_of_sizes
 from contfric.orbit.orbit import Orbit
 from contfric.orbit.positions.kept import Places
 from contfric.remember.journal import remembered
@@ -115,7 +115,8 @@ def find_orbit(
     checked, time = model.check_params(params), real_number("time", time)
     places = Places(model, checked, at)
     begun = places.begin(state)
-    found = simulated_orbit(model, checked, begun, time, longest, progress=progress)
+    with sizes_told():
+        found = simulated_orbit(model, checked, begun, time, longest, progress=progress)
     found = places.put(_wanted(found, periods))
     warn_of_sizes(found)
     warn_of_hits_together(found)

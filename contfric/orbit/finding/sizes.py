@@ -1,12 +1,22 @@
-"""Warnings of orbits that are found: far from 1 in size, or on both sides of an event at once."""
+"""Warnings of orbits that are found: far from 1 in size, or on both sides of an event at once.
+
+And what to say where none is found, and the numbers are far from 1.
+"""
 
 from __future__ import annotations
 
 import logging
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
+from contfric.errors import ConvergenceError
+from contfric.models.check.probe import Probe
+from contfric.models.check.scales import forced_sizes
 from contfric.orbit.orbit import Orbit
+from contfric.simulation.simulate import Trajectory
 
 _log = logging.getLogger(__name__)
 #: What is short or near is decided at thousandths of 1: events are missed from a hundredth on.
@@ -35,6 +45,41 @@ def warn_of_sizes(orbit: Orbit) -> None:
             orbit.model.name,
             " and ".join(far),
         )
+
+
+@contextmanager
+def sizes_told() -> Iterator[None]:
+    """Say of a simulation that came to no orbit that its numbers are far from 1: that may be why.
+
+    It starts displaced by the ``spread`` of its states, which is 1 where the model does not say, and a metre
+    is far beyond the gap of a wall.
+    """
+    try:
+        yield
+    except ConvergenceError as error:
+        found = error.result
+        if not isinstance(found, Trajectory) or found.model.units or not (far := _far(found)):
+            raise
+        raise type(error)(
+            f"{error}. The reason may be that numbers are far from 1 ({' and '.join(far)}): write "
+            "'units: auto' into the model (units=\"auto\" in Python) first",
+            found,
+        ) from None
+
+
+def _far(trajectory: Trajectory) -> list[str]:
+    """Return what is far from 1: what the excitation moves states by, else what they end at; the period."""
+    model, probe = trajectory.model, Probe(trajectory.model, trajectory.params)
+    late = np.abs(trajectory.states[len(trajectory) // 2 :])
+    size, far = max(forced_sizes(probe).values(), default=0.0), []
+    if size == 0.0 and late.size:
+        size = float(late.max())
+    if size > 0.0 and not 1.0 / _FAR < size < _FAR:
+        far.append(f"states of {size:.1g}")
+    period = model.view(model.vector(trajectory.params)).period / math.tau
+    if period > 0.0 and not 1.0 / _FAR < period < _FAR:
+        far.append(f"a period of {math.tau * period:.1g}")
+    return far
 
 
 def warn_of_hits_together(orbit: Orbit) -> None:
