@@ -160,6 +160,8 @@ def checked(proof: Certificate | EventCertificate) -> tuple[dict[str, Any] | Non
 
     if not proof.proved:
         return None, "it is not proved"
+    if isinstance(proof, Certificate) and proof.orbit.model.name not in CHECKED_MODELS:
+        return None, "an orbit of a declared model has a file of its own only"
     try:
         data = certificate_data if isinstance(proof, Certificate) else event_data
         part = data(proof)  # type: ignore[arg-type] # each has its own
@@ -290,9 +292,9 @@ def _unstated(text: str) -> str:
 
 def checked_text(text: str) -> Answer:
     """Check a text by the checker that knows its kind: with a law of its own, or of a known model."""
-    from contfric.verify import piecewise
+    from contfric.verify.piecewise import check_text as check_law
 
-    return (piecewise.check_text if '"equations"' in text else check_text)(text)
+    return (check_law if '"equations"' in text else check_text)(text)
 
 
 def verify(path: Any) -> Answer:

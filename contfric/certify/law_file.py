@@ -1,14 +1,14 @@
 """The certificate of an orbit of a piecewise-linear model as plain data: it states the law of the model, too.
 
-The law is what :mod:`contfric.verify.piecewise` reads: the fields, surfaces and maps of the modes that the orbit
-visits, as formulas of the parameters, the sides on which each mode holds, and the transitions between them.
+The law is what :mod:`contfric.verify.piecewise` reads: the fields, surfaces and maps of the modes that an
+orbit visits, as formulas of the parameters, the sides on which each mode holds, and the transitions.
 The orbit is written as a whole, not as its half.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -120,7 +120,9 @@ def _held_in(system: System, i: int, names: list[str]) -> tuple[str, dict[str, i
     return f"{mode} ({exit_} {'>' if side > 0 else '<'} 0)", sides | {exit_: side}
 
 
-def law_certificate(certificate: Certificate, written: Any) -> dict[str, Any]:
+def law_certificate(
+    certificate: Certificate, written: Callable[[Certificate], dict[str, Any]]
+) -> dict[str, Any]:
     """Return the certificate of an orbit with the law of its model as plain data.
 
     Parameters

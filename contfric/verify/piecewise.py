@@ -1,38 +1,31 @@
-"""Orbits of piecewise-linear models: the file states the law of its model, and an orbit of it.
+"""Orbits of piecewise-linear models, whose law the file states (:mod:`contfric.verify.law`).
 
-The law is a hybrid automaton. In a mode ``w' = M w`` holds, w = (y, 1, cos(k omega t), sin(k omega t), ...), as
-long as some surfaces, rows ``g w``, are on the sides that it names. Where one of them is met, a transition
-leads on: to another mode, or by a map of y. Entries are formulas of the parameters, so that they are
-known to as many digits as are asked for, and exactly where they are rational.
-
-An orbit is a zero of F(z), z the joints (t_i, y_i): each segment leads from a joint to the next one, on its surface.
-With C near the inverse of the Jacobian J, ``z - C F(z)`` contracts a box of half-widths r about c into itself if
-``|1 - C J| r + |C F(c)| < r``. Flows are sums of Taylor with a bound of what is left out:
+An orbit is a zero of F(z), z the joints (t_i, y_i): segments lead from one to the next, on surfaces. With
+C near the inverse of J = F', ``z - C F(z)`` contracts a box c + [-r, r] if ``|1 - C J| r + |C F(c)| < r``.
+Flows are Taylor's series, with a bound of what is left out:
 
     |sum over k > p of (M tau)^k w / k!| <= (a tau)^(p + 1) / (p + 1)! exp(a tau) |w| ,    a = |M| .
 """
 
 from __future__ import annotations
 
-import ast
 import json
 from functools import cached_property
 from math import ceil, log2, prod
 from typing import Any
 
-from flint import acb, arb, arb_mat, arb_poly, ctx, fmpq
+from flint import acb, acb_poly, arb, arb_mat, arb_poly, ctx, fmpq
 
 from contfric.verify.file import BITS, CLAIMS, FORMAT, Answer
+from contfric.verify.law import Law, Number, dot, in_span, is_kept, times
 from contfric.verify.motion import Refused, Undecided, ball, see
 
 PIECES, HALVINGS, TERMS = 20_000, 60, 24  # of a segment, of a piece, of a series on it
-MOST_ORDER, LARGEST_POWER = 6, 64
+MOST_ORDER = 6  # of a zero
 ENTRIES = {
     *("certificate", "format", "model", "params", "equations", "periods", "segments"),
     *("joints", "radius", "enclosure", "multipliers", "statements"),
 }
-FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh", "atan", "asin", "acos")
-Number = Any  # an exact fraction, or a ball
 
 
 def check_text(text: str) -> Answer:
@@ -56,7 +49,7 @@ def check_text(text: str) -> Answer:
 
 
 def _check(data: Any) -> list[str]:
-    claims = data["statements"]
+    claims: list[str] = data["statements"]
     see(claims == ["exists", *(c for c in CLAIMS if c in claims)], "it states what an orbit is")
     chain = Chain(Law(data["equations"], data["params"]), data["segments"][:], data["periods"])
     printed, radii = ([ball(c - 0) for c in data[name][:]] for name in ("joints", "radius"))
@@ -76,171 +69,16 @@ def _check(data: Any) -> list[str]:
     if "stable" in claims or "unstable" in claims:
         see(("stable" in claims) != ("unstable" in claims), "it is stable or not")
         see(is_inside(found) == ("stable" in claims), "multipliers are on that side of the circle")
-    stated = [acb(ball(d["re"]), ball(d["im"])) for d in data["multipliers"][:] if len(d) == 2]
-    if data["multipliers"]:
-        see(len(stated) == len(data["multipliers"]) == size, "it has all multipliers")
-        hold = [*discs(found), *[acb(0)] * (size - found.degree())]
-        for disc in hold:
+    discs_stated = data["multipliers"][:]
+    stated = [acb(ball(d["re"]), ball(d["im"])) for d in discs_stated if len(d) == 2]
+    if discs_stated:
+        see(len(stated) == len(discs_stated) == size, "it has all multipliers")
+        for disc in [*discs(found), *[acb(0)] * (size - found.degree())]:
             own = [k for k, s in enumerate(stated) if s.contains(disc)]
             see(own != [], "multipliers are in their discs", False)
             del stated[own[0]]
-    return (
-        claims
-        + ["multipliers"] * bool(data["multipliers"])
-        + [f"in the stated law of {len(chain.law.modes)} modes"]
-    )
-
-
-# ------------------------------------------------------------------------------------------- the law
-
-
-def value(text: Any, names: dict[str, Number]) -> Number:
-    """Return the value of a formula: a fraction if it is one, else a ball."""
-    if type(text) in (int, float):
-        return fraction(text)
-    see(isinstance(text, str) and len(text) < 10_000, "entries are formulas")
-
-    def of(node: ast.expr) -> Number:
-        match node:
-            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return fraction(number)
-            case ast.Name(id="pi") if "pi" not in names:
-                return arb.pi()
-            case ast.Name(id=name) if name in names:
-                return names[name]
-            case ast.UnaryOp(op=ast.USub(), operand=x):
-                return -of(x)
-            case ast.BinOp(left=x, op=ast.Add(), right=y):
-                return of(x) + of(y)
-            case ast.BinOp(left=x, op=ast.Sub(), right=y):
-                return of(x) - of(y)
-            case ast.BinOp(left=x, op=ast.Mult(), right=y):
-                return of(x) * of(y)
-            case ast.BinOp(left=x, op=ast.Div(), right=y):
-                return of(x) / of(y)
-            case ast.BinOp(left=x, op=ast.Pow(), right=y):
-                return power(of(x), of(y))
-            case ast.Call(func=ast.Name(id="sqrt"), args=[x], keywords=[]):
-                return power(of(x), fmpq(1, 2))
-            case ast.Call(func=ast.Name(id="Abs"), args=[x], keywords=[]):
-                return abs(of(x))
-            case ast.Call(func=ast.Name(id=name), args=[x], keywords=[]) if name in FUNCTIONS:
-                return getattr(arb(of(x)), name)()
-        raise Refused(f"{ast.unparse(node)[:40]!r} is no formula of the parameters")
-
-    return of(ast.parse(text, mode="eval").body)
-
-
-def fraction(number: float) -> fmpq:
-    """Return a number of a file, exactly."""
-    return fmpq(*number.as_integer_ratio())
-
-
-def power(x: Number, exponent: Number) -> Number:
-    """Return a power with an exponent that is a whole number or a half of one."""
-    see(isinstance(exponent, fmpq) and exponent.q in (1, 2), "exponents are whole or half numbers")
-    see(abs(exponent) <= LARGEST_POWER, "exponents are small")
-    return x ** int(exponent) if exponent.q == 1 else arb(x).sqrt() ** int(exponent.p)
-
-
-def is_zero(x: Number) -> bool:
-    """Tell whether a number is exactly zero."""
-    return x == 0 if isinstance(x, fmpq) else bool(x.is_zero())
-
-
-def times(row: list[Number], matrix: list[list[Number]]) -> list[Number]:
-    """Return a row times a matrix, exact where they are."""
-    pairs = [(c, other) for c, other in zip(row, matrix, strict=True) if not is_zero(c)]
-    return [
-        sum((c * o[j] for c, o in pairs if not is_zero(o[j])), fmpq(0))
-        for j in range(len(matrix[0]))
-    ]
-
-
-def in_span(row: list[Number], others: list[list[Number]]) -> bool:
-    """Tell whether a row is a combination of others, exactly."""
-    others, left = [list(other) for other in others], list(row)
-    while others:
-        own = others.pop()
-        pivot = next((j for j, c in enumerate(own) if not is_zero(c)), None)
-        if pivot is None or (isinstance(own[pivot], arb) and 0 in own[pivot]):
-            continue
-        for other in (*others, left):
-            factor = other[pivot] / own[pivot]
-            other[:] = [
-                c if is_zero(o) or is_zero(factor) else c - factor * o
-                for c, o in zip(other, own, strict=True)
-            ]
-            other[pivot] = fmpq(0)
-    return all(is_zero(c) for c in left)
-
-
-class Law:
-    """The law of a file: fields, surfaces and maps as rows of the extended state, and transitions."""
-
-    def __init__(self, data: Any, params: Any) -> None:
-        entries = {"states", "frequency", "harmonics", "modes", "surfaces", "maps", "transitions"}
-        see(set(data) == entries, "a law has no other entries")
-        names = {name: fraction(number) for name, number in params.items()}
-        self.states, self.harmonics = data["states"][:], data["harmonics"][:]
-        self.n, whole = len(self.states), all(type(k) is int and k > 0 for k in self.harmonics)
-        see(
-            whole and len(set(self.harmonics)) == len(self.harmonics), "harmonics are whole numbers"
-        )
-        self.autonomous = data["frequency"] is None
-        see(not (self.autonomous and self.harmonics), "harmonics have a frequency")
-        self.omega = fmpq(1) if self.autonomous else value(data["frequency"], names)
-        see(arb(self.omega), "the frequency is positive", False)
-        self.columns = [
-            *self.states,
-            "1",
-            *(f"{f}({k})" for k in self.harmonics for f in ("cos", "sin")),
-        ]
-        see(
-            len(set(self.columns)) == len(self.columns) and self.n > 0,
-            "states have their own names",
-        )
-        self.size = len(self.columns)
-        waves = [[fmpq(0)] * self.size for _ in range(self.size - self.n)]
-        for j, k in enumerate(self.harmonics):
-            waves[1 + 2 * j][self.n + 2 + 2 * j] = -k * self.omega
-            waves[2 + 2 * j][self.n + 1 + 2 * j] = k * self.omega
-        still = [
-            [fmpq(int(j == self.n + k)) for j in range(self.size)]
-            for k in range(self.size - self.n)
-        ]
-
-        def row(entries: Any) -> list[Number]:
-            see(set(entries) <= set(self.columns), "rows are of the states and harmonics")
-            return [value(entries.get(name, 0), names) for name in self.columns]
-
-        def matrix(rows: Any, rest: list[list[Number]]) -> list[list[Number]]:
-            see(list(rows) == self.states, "there is a row for each state")
-            return [*map(row, rows.values()), *rest]
-
-        self.surfaces = {name: row(entries) for name, entries in data["surfaces"].items()}
-        self.modes = {name: matrix(mode["field"], waves) for name, mode in data["modes"].items()}
-        self.sides = {name: sides(mode["inside"]) for name, mode in data["modes"].items()}
-        see(all(len(mode) == 2 for mode in data["modes"].values()), "a mode states nothing else")
-        self.maps = {name: matrix(rows, still) for name, rows in data["maps"].items()}
-        self.transitions = data["transitions"][:]
-        for one in self.transitions:
-            see(
-                set(one) == {"from", "at", "when", "map", "after", "to"},
-                "a transition has no other entries",
-            )
-            sides(one["when"]), sides(one["after"])
-
-
-def sides(given: Any) -> dict[str, int]:
-    """Return sides of surfaces."""
-    see(all(type(side) is int and side in (-1, 0, 1) for side in given.values()), "sides are signs")
-    return dict(given)
-
-
-def dot(row: list[Number], w: arb_mat) -> arb:
-    """Return a surface's value at an extended state."""
-    return sum((arb(c) * w[j, 0] for j, c in enumerate(row) if not is_zero(c)), arb(0))
+    where = f"in the law of {len(chain.law.modes)} modes that it states"
+    return [*claims, *["multipliers"] * bool(discs_stated), where]
 
 
 class Field:
@@ -287,20 +125,20 @@ class Field:
             found = found * found
         return found
 
-    def series(self, row: list[Number], terms: list[arb_mat], reach: arb) -> tuple[arb_poly, arb]:
-        """Return g exp(M tau) w in powers of tau, and a bound by tau^(p + 1) of what is left, |tau| in reach."""
-        w = zip(terms[0].entries(), self.scales, strict=True)
-        size = max(((abs(c) / k).upper() for c, k in w), key=float)
-        weight = sum((abs(arb(c)) * k for c, k in zip(row, self.scales, strict=True)), arb(0))
-        growth = (self.bound * reach).exp() * self.bound ** (TERMS + 1) / arb(TERMS + 2).gamma()
-        return arb_poly([dot(row, term) for term in terms]), (growth * size * weight).upper()
-
-    def terms(self, w: arb_mat) -> list[arb_mat]:
-        """Return Taylor's coefficients of exp(M tau) w."""
-        found = [w]
+    def series(self, rows: list[list[Number]], w: arb_mat, reach: arb) -> list[tuple[Any, arb]]:
+        """Return Taylor's coefficients of g exp(M tau) w of rows g, and bounds of what is left, by powers."""
+        terms, at, scales = [w], arb_mat([[arb(c) for c in g] for g in rows]), self.scales
         for k in range(1, TERMS + 1):
-            found.append(self.matrix * found[-1] * (arb(1) / k))
-        return found
+            terms.append(self.matrix * terms[-1] * (arb(1) / k))
+        size = max((abs(c) / k for c, k in zip(w.entries(), scales, strict=True)), key=arb.upper)
+        growth = (self.bound * reach).exp() * self.bound ** (TERMS + 1) / arb(TERMS + 2).gamma()
+        values = at * arb_mat([term.entries() for term in terms]).transpose()
+        weights = [
+            sum((abs(c) * k for c, k in zip(g, scales, strict=True)), arb(0)) for g in at.tolist()
+        ]
+        return [
+            (v, growth * size.upper() * a) for v, a in zip(values.tolist(), weights, strict=True)
+        ]
 
 
 # ---------------------------------------------------------------------------------------- the orbit
@@ -352,7 +190,7 @@ class Chain:
         return by * w, by * rate, by
 
     def equations(self, z: list[arb]) -> tuple[list[arb], arb_mat, list[Any]]:
-        """Return what vanishes for a solution, its Jacobian, and what each segment does to disturbances."""
+        """Return what vanishes for a solution, its Jacobian, and each segment's derivatives."""
         values, rows, moves, n, m = list[arb](), list[list[arb]](), list[Any](), self.n, self.m
         for i, (mode, exit_, _) in enumerate(self.legs):
             field, surface = self.fields[mode], self.law.surfaces[exit_]
@@ -360,24 +198,20 @@ class Chain:
             flow = field.flow(self.duration(z, i))
             end, (after, late) = flow * w, self.extended(z, i + 1)
             speed, by_time, by_state = field.matrix * end, flow * rate, flow * by
-            ahead = (i + 1) % self.count
-            timed = not self.autonomous or ahead  # else the last joint has time 0
-            for j in range(n):
+            ahead = (i + 1) % self.count * m
+            timed = int(not self.autonomous or ahead > 0)  # else the last joint has time 0
+            own = [[by_time[j, 0] - speed[j, 0], *by_state.tolist()[j][:n]] for j in range(n)]
+            own += [[arb(0)] * m]
+            then = [[speed[j, 0], *(arb(-int(j == k)) for k in range(n))] for j in range(n)]
+            then += [[dot(surface, late), *(arb(c) for c in surface[:n])]]
+            for at_start, (by_t, *by_y) in zip(own, then, strict=True):
                 row = [arb(0)] * (self.count * m)
-                row[i * m] += by_time[j, 0] - speed[j, 0]
-                for k in range(n):
-                    row[i * m + 1 + k] += by_state[j, k]
-                row[ahead * m + 1 + j] -= 1
-                row[ahead * m] += speed[j, 0] if timed else 0
-                values.append(end[j, 0] - after[j, 0])
+                row[i * m : i * m + m] = at_start
+                for k, c in enumerate([by_t * timed, *by_y]):
+                    row[ahead + k] += c
                 rows.append(row)
-            row = [arb(0)] * (self.count * m)
-            row[ahead * m] += dot(surface, late) if timed else 0
-            for k in range(n):
-                row[ahead * m + 1 + k] += arb(surface[k])
-            values.append(dot(surface, after))
-            rows.append(row)
-            moves.append((by_time, speed, by_state, late))
+            values += [*(end[j, 0] - after[j, 0] for j in range(n)), dot(surface, after)]
+            moves.append((arb_mat(own[:n]), speed, then[n]))
         return values, arb_mat(rows), moves
 
     def contracts(self, centre: list[arb], radii: list[arb]) -> bool:
@@ -410,7 +244,7 @@ class Chain:
         raise Undecided("one orbit in a box")
 
     def is_least(self, z: list[arb]) -> bool:
-        """Tell whether the orbit does not repeat within its period: every joint is one that the law forces."""
+        """Tell whether the orbit does not repeat within its period: the law forces each joint."""
         for parts in (q for q in range(2, self.count + 1) if self.count % q == 0):
             at = self.count // parts * self.m
             apart = any(not (z[at + 1 + j] - z[1 + j]).contains(0) for j in range(self.n))
@@ -423,16 +257,12 @@ class Chain:
 
     @cached_property
     def zeros(self) -> list[list[list[Number]]]:
-        """Rows that vanish at the end of each segment: its surface, and what its mode keeps from its start."""
+        """Rows that vanish at the end of each segment: its surface, and what its mode keeps."""
         found = [[self.law.surfaces[exit_]] for _, exit_, _ in self.legs]
         for i in [*range(self.count)] * 2:
             for row in self.law.surfaces.values():
-                kept = is_kept(row, self.law.modes[self.legs[i][0]])
-                if (
-                    kept
-                    and in_span(row, found[i]) is False
-                    and self.vanishes_at_start(row, i, found)
-                ):
+                kept = is_kept(row, self.law.modes[self.legs[i][0]]) and not in_span(row, found[i])
+                if kept and self.vanishes_at_start(row, i, found):
                     found[i].append(row)
         return found
 
@@ -453,29 +283,20 @@ class Chain:
 
     def check_admissible(self, z: list[arb]) -> None:
         """See that the law is obeyed at every instant."""
+        surfaces = self.law.surfaces
         for i, (mode, exit_, one) in enumerate(self.legs):
             what, duration, inside = f"segment {i + 1}", self.duration(z, i), self.law.sides[mode]
             see(duration, f"{what} lasts")
             end, begun = self.extended(z, i + 1)[0], self.start(z, (i + 1) % self.count)[0]
-            for name, side in one["when"].items():
-                see(
-                    side and side * dot(self.law.surfaces[name], end), f"{what} leads on so: {name}"
-                )
-            for name, side in one["after"].items():
-                met = side * dot(self.law.surfaces[name], begun)
-                see(side and met, f"{what} is mapped so: {name}")
-            field, surfaces = self.fields[mode], self.law.surfaces
-            speed = dot(surfaces[exit_], field.matrix * end)
+            asked = [(name, side, end) for name, side in one["when"].items()]
+            asked += [(name, side, begun) for name, side in one["after"].items()]
+            for name, side, state in asked:
+                see(side and side * dot(surfaces[name], state), f"{what} leads on so, at {name}")
+            speed = dot(surfaces[exit_], self.fields[mode].matrix * end)
             see(-inside[exit_] * speed, f"{what} meets its surface transversally")
-            for name, side in inside.items():
-                if side:
-                    continue
-                kept = is_kept(surfaces[name], field.rows)
-                see(
-                    kept and self.vanishes_at_start(surfaces[name], i),
-                    f"{what} rests on {name}",
-                    False,
-                )
+            for name in (name for name, side in inside.items() if side == 0):
+                kept = is_kept(surfaces[name], self.law.modes[mode])
+                see(kept and self.vanishes_at_start(surfaces[name], i), f"{what} rests", False)
             signs = {name: side for name, side in inside.items() if side}
             self.check_inside(i, signs, duration, (self.start(z, i)[0], end))
 
@@ -488,69 +309,38 @@ class Chain:
         step = (duration / pieces).upper()
         see(duration - (pieces - 1) * step, "a segment is known well", False)
         flow = field.flow(arb(step.mid()))
-        for k in range(pieces):
-            terms = field.terms(w if k + 1 < pieces else end)
-            for name, side in signs.items():
-                row, first, last = self.law.surfaces[name], k == 0, k + 1 == pieces
-                order = self.order(row, i, last) if first or (last and name == exit_) else 0
-                poly, left = field.series([side * c for c in row], terms, step)
-                coefficients = [c * (-1) ** (j * last) for j, c in enumerate(poly.coeffs())]
-                found = arb_poly(coefficients[order:])
-                left = left * step ** (TERMS + 1 - order)
-                is_positive(found, step, left, f"segment {i + 1}: {name} is not met inside")
+        rows = [[side * c for c in self.law.surfaces[name]] for name, side in signs.items()]
+        for k in range(pieces if rows else 0):
+            last = k + 1 == pieces
+            series = field.series(rows, end if last else w, step)
+            for name, (coefficients, left) in zip(signs, series, strict=True):
+                at_end = last and name == exit_
+                order = self.order(self.law.surfaces[name], i, last) if at_end or k == 0 else 0
+                found = [c * (-1) ** (j * last) for j, c in enumerate(coefficients)][order:]
+                what = f"segment {i + 1}: {name} is not met inside"
+                is_positive(arb_poly(found), step, left * step ** (TERMS + 1 - order), what)
             w = flow * w
 
     # ------------------------------------------------------------------------ multipliers
 
     def characteristic(self, z: list[arb]) -> arb_poly:
-        """Return the characteristic polynomial of a Poincare map, on the rows that vanish at its joint."""
-        m, moves = self.m, self.equations(z)[2]
+        """Return the characteristic polynomial of a Poincare map, less zeros of what vanishes there."""
+        m, n, moves, first = self.m, self.n, self.equations(z)[2], int(self.autonomous)
         at, total = max(range(self.count), key=lambda i: len(self.zeros[i])), arb_mat(m, m, 1)
         for i in [*range(at + 1, self.count), *range(at + 1)]:
-            by_time, speed, by_state, late = moves[i]
-            surface = self.law.surfaces[self.legs[i][1]]
-            own = arb_mat(
-                [
-                    [by_time[j, 0] - speed[j, 0], *(by_state[j, k] for k in range(self.n))]
-                    for j in range(self.n)
-                ]
-            )
-            rate = dot(surface, late) + sum(
-                (arb(surface[j]) * speed[j, 0] for j in range(self.n)), arb(0)
-            )
+            own, speed, (late, *slope) = moves[i]
+            rate = late + sum((c * speed[j, 0] for j, c in enumerate(slope)), arb(0))
             see(abs(rate), "a surface is met transversally", False)
-            time = arb_mat([[arb(surface[j]) for j in range(self.n)]]) * own * (-1 / rate)
-            state = own + arb_mat([[speed[j, 0]] for j in range(self.n)]) * time
+            time = arb_mat([slope]) * own * (-1 / rate)
+            state = own + arb_mat([[speed[j, 0]] for j in range(n)]) * time
             total = arb_mat([time.entries(), *state.tolist()]) * total
-        late, first = self.extended(z, at + 1)[1], int(self.autonomous)
-        rows = [[dot(row, late), *(arb(c) for c in row[: self.n])] for row in self.zeros[at]]
-        basis = [[arb(int(j == k)) for k in range(first, m)] for j in range(first, m)]
-        free = list(range(m - first))
-        for row in (row[first:] for row in rows):  # which gives one coordinate by the others
-            size = range(len(free))
-            factors = [
-                sum((c * b[f] for c, b in zip(row, basis, strict=True)), arb(0)) for f in size
-            ]
-            pivot = max(size, key=lambda f: float(abs(factors[f]).lower()))
-            if not abs(factors[pivot]) > 0:
-                continue
-            for b in basis:
-                share = b[pivot] / factors[pivot]
-                b[:] = [
-                    c - share * f
-                    for k, (c, f) in enumerate(zip(b, factors, strict=True))
-                    if k != pivot
-                ]
-            del free[pivot]
-        if not free:
-            return arb_poly([1])
-        part = arb_mat([row[first:] for row in total.tolist()[first:]]) * arb_mat(basis)
-        return arb_mat([part.tolist()[k] for k in free]).charpoly()
-
-
-def is_kept(row: list[Number], matrix: list[list[Number]]) -> bool:
-    """Tell whether a surface's value does not change in a mode, exactly."""
-    return all(is_zero(c) for c in times(row, matrix))
+        independent, exact = [self.zeros[at][0][:n]], True
+        for row in (row[:n] for row in self.zeros[at]):
+            exact = exact and all(isinstance(c, fmpq) for c in row)
+            if exact and not in_span(row, independent):
+                independent.append(row)
+        part = arb_mat([row[first:] for row in total.tolist()[first:]])
+        return arb_poly(part.charpoly().coeffs()[len(independent) :])
 
 
 def is_positive(poly: arb_poly, end: arb, left: arb, what: str) -> None:
@@ -578,31 +368,27 @@ def is_inside(poly: arb_poly) -> bool:
 
 
 def discs(poly: arb_poly) -> list[acb]:
-    """Return a disc about each zero: of radius m |p(c_i)| / prod |c_i - c_j|, joined where they meet (Smith)."""
-    m = poly.degree()
+    """Return a disc about each zero, joined where they meet: radii m |p(c_i)| / prod |c_i - c_j| (Smith)."""
+    m, roots, radii = poly.degree(), list[acb](), list[arb]()
     a = [poly[k] / poly[m] for k in range(m + 1)]
-    monic = [acb(c.mid()) for c in a]
-    scale = (
-        2 * max([float(abs(c)) ** (1 / (m - k)) for k, c in enumerate(a[:-1])], default=0) or 1.0
-    )
-    zeros = [acb(scale) * acb(0.4, 0.9) ** k for k in range(m)]
+    monic, exact = acb_poly(a), acb_poly([c.mid() for c in a])
+    scale = 2 * max([float(abs(c)) ** (1 / (m - k)) for k, c in enumerate(a[:-1])], default=1) or 1
+    roots = [acb(scale) * acb(0.4, 0.9) ** k for k in range(m)]
 
-    def at(c: acb, given: list[Any]) -> acb:
-        return sum((x * c**k for k, x in enumerate(given)), acb(0))
+    def ratio(p: acb_poly, k: int) -> acb:
+        others = (roots[k] - c for j, c in enumerate(roots) if j != k)
+        return p(roots[k]) / prod(others, start=acb(1))
 
-    for _ in range(4 * ctx.prec.bit_length() + 40 * m):
-        for k, c in enumerate(zeros):
-            others = prod((c - d for j, d in enumerate(zeros) if j != k), start=acb(1))
-            step = (at(c, monic) / others).mid() if others != 0 else acb(0)
-            zeros[k] = (c - step).mid() if step.is_finite() else c
-    radii = []
-    for k, c in enumerate(zeros):
-        others = prod((abs(c - d) for j, d in enumerate(zeros) if j != k), start=arb(1))
-        radii.append((m * abs(at(c, a)) / others).upper())
-    found = [acb(arb(c.real, r), arb(c.imag, r)) for c, r in zip(zeros, radii, strict=True)]
-    for _ in found:
-        for k, disc in enumerate(found):
-            for other in found:
-                if disc.overlaps(other):
-                    found[k] = disc = disc.union(other)
+    for _ in range(40 * m):  # Durand, Kerner
+        moved = arb(0)
+        for k, c in enumerate(roots):
+            roots[k] = (c - ratio(exact, k).mid()).mid()
+            moved = moved.max(abs(roots[k] - c) / scale)
+        if moved < arb(2) ** (-2 * ctx.prec // 3):
+            break
+    radii = [(m * abs(ratio(monic, k))).upper() for k in range(m)]
+    found = [acb(arb(c.real, r), arb(c.imag, r)) for c, r in zip(roots, radii, strict=True)]
+    for k in [*range(m)] * m:
+        for other in found:
+            found[k] = found[k].union(other) if found[k].overlaps(other) else found[k]
     return found
