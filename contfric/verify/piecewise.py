@@ -37,7 +37,7 @@ def check_text(text: str) -> Answer:
         see(known, f"it is a certificate of an orbit, of format {FORMAT}")
         see(set(data) == ENTRIES, "it states nothing else")
         why = ""
-        for bits in BITS:
+        for bits in BITS[1:]:
             with ctx.workprec(bits):
                 try:
                     return Answer(True, "", tuple(_check(data)), bits)
@@ -230,12 +230,13 @@ class Chain:
 
     def near(self, printed: list[arb]) -> list[arb]:
         """Return balls that hold exactly one solution, next to printed joints."""
-        z, least = [arb(c.mid()) for c in printed], arb(2) ** (-ctx.prec // 2)
-        for _ in range(12):
-            f, jacobian, _ = self.equations(z)
-            step = jacobian.mid().inv().mid() * arb_mat([[arb(c.mid())] for c in f])
-            z = [arb((c - d).mid()) for c, d in zip(z, step.entries(), strict=True)]
-            if max((abs(d) for d in step.entries()), key=float) < least:
+        z, least = [arb(c.mid()) for c in printed], arb(2) ** (-5 * ctx.prec // 6)
+        inverse = self.equations(z)[1].mid().inv().mid()
+        for _ in range(20):
+            f = arb_mat([[arb(c.mid())] for c in self.equations(z)[0]])
+            step = (inverse * f).entries()
+            z = [arb((c - d).mid()) for c, d in zip(z, step, strict=True)]
+            if max((abs(d) for d in step), key=float) < least:
                 break
         for power in (5 * ctx.prec // 6, 2 * ctx.prec // 3):
             radii = [(1 + abs(c)).upper() * arb(2) ** -power for c in z]
