@@ -23,6 +23,9 @@ from contfric.models.definition import Model
 from contfric.models.mode_domains import mode_domains
 from contfric.verify.piecewise import check_text
 
+#: The checker inverts a dense matrix of as many rows: 250 take it 2 s, and twice as many eight times that.
+_MOST_UNKNOWNS = 600
+
 
 @dataclass(frozen=True)
 class _Writer:
@@ -139,6 +142,12 @@ def law_certificate(
     if orbit.system.holds or certificate.kept:
         what = "holds" if orbit.system.holds else "a family of orbits"
         raise ParameterError(f"certificate files are not offered for {what} of declared models")
+    size = orbit.joints.size * (2 if orbit.system.half else 1)
+    if size > _MOST_UNKNOWNS:
+        raise ParameterError(
+            f"certificate files of declared models have at most {_MOST_UNKNOWNS} unknowns, "
+            f"and the joints of this orbit have {size}"
+        )
     if orbit.system.half:
         certificate = certify_orbit(orbit.as_whole())
         orbit = certificate.orbit
