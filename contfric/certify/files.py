@@ -41,7 +41,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If a file cannot state it: its model is unknown to the checker, or the orbit has holds.
+        If a file cannot state it (holds, a family of orbits), or the checker does not verify it.
     """
     orbit = certificate.orbit
     if not certificate.exists.proved:
@@ -328,7 +328,8 @@ def verify(path: Any) -> Answer:
     if not answer.yes and '"checkable": []' in text:  # of another model, or all orbits have holds
         why = (
             "it has no statement that is checked here. Checked are orbits without holds of the model "
-            f"{', '.join(CHECKED_MODELS)}, their events and branches; of others it has the summary only"
+            f"{', '.join(CHECKED_MODELS)}, their events and branches; of others it has the summary only "
+            "(an orbit of a declared model has a file of its own: orbit.certify().save)"
         )
         return answer._replace(why=why)
     return answer
