@@ -9,6 +9,7 @@ python -m benchmarks.certificates figures DIR      Figs. 4, 5, 6, 7, 13 of the p
 python -m benchmarks.certificates chaos            horseshoes of the release map in the plane of Fig. 9
 python -m benchmarks.certificates census           ten values of Omega of Fig. 5: nothing else is there
 python -m benchmarks.certificates cheats 10000     changed certificates: how many are verified
+python -m benchmarks.certificates laws 1000        the same of declared models, whose files state the law
 python -m benchmarks.certificates horseshoes 100   changed horseshoes: how many false ones are proved
 """
 
@@ -30,10 +31,12 @@ from contfric.certify.tubes.tube_file import tubes_of
 from contfric.errors import ContfricError
 from contfric.models.balls.build import ball_model
 from contfric.verify.file import check_text
+from contfric.verify.piecewise import check_text as check_law
 from tests import release_oracle, tube_oracle
 from tests.certificate_oracle import false_statements, mutated
 from tests.contracts.test_event_files import KINDS, files
 from tests.event_oracle import changed, false_event
+from tests.law_oracle import false_law_statements, mutated_law
 
 SCENES: dict[str, tuple[dict[str, float], str, tuple[float, float]]] = {
     "Omega (Fig. 5)": ({"Omega": 0.5, "S": 0.32, "S0": 0.4}, "Omega", (0.4, 0.6)),
@@ -101,7 +104,7 @@ def models(count: int) -> None:
     found: Counter[str] = Counter()
     refused: dict[str, str] = {}
     offered: dict[str, Any] = {}
-    seconds: list[float] = []
+    seconds, checking = list[float](), list[float]()
     for path in files:
         try:
             model = cf.load_model(path)
@@ -121,6 +124,16 @@ def models(count: int) -> None:
             certificate = orbit.certify()
             seconds.append(time.process_time() - begin)
             what = "proved" if certificate.proved else certificate.why.split(";")[0]
+            if certificate.proved:
+                try:
+                    text = json.dumps(
+                        certificate_data(certificate)
+                    )  # of those that are verified only
+                    begin = time.process_time()
+                    what += ", and verified" if check_law(text).yes else ", and refused"
+                    checking.append(time.process_time() - begin)
+                except ContfricError as error:
+                    what += f"; no file: {error}"
             found[what] += 1
             if not certificate.proved:
                 print(f"{name}: {params} {orbit.name}: {certificate.why}", flush=True)
@@ -130,7 +143,10 @@ def models(count: int) -> None:
     print(f"offered for {len(offered)} models, refused for {len(refused)}:")
     for name, why in refused.items():
         print(f"{name}: {why}")
-    print(f"{sum(seconds):.1f} s, median {np.median(seconds):.3f} s, most {max(seconds):.2f} s")
+    for who, times in (("prover", seconds), ("checker", checking)):
+        print(
+            f"{who}: {sum(times):.1f} s, median {np.median(times):.3f} s, most {max(times):.2f} s"
+        )
 
 
 def events() -> None:
@@ -252,6 +268,27 @@ def cheats(count: int) -> None:
     print(Counter(known), f"{time.process_time() - begin:.1f} s of the processor")
 
 
+#: Impacts, sticks with excitation and without, a relay, a firing, a heater, a rocking block.
+LAWS = (
+    *("impact", "dead-band", "relay", "integrate-and-fire", "thermostat", "rocking-block"),
+    "coulomb-yaml",
+)
+
+
+def laws(count: int) -> None:
+    """Change true certificates of declared models, their laws among what is changed."""
+    found, begin = Counter[str](), time.process_time()
+    true = [certificate_data(cf.find_orbit(name).certify()) for name in LAWS]
+    for k in range(count):
+        data = mutated_law(true[k % len(true)], np.random.default_rng([31, k]))
+        verdict = "refused"
+        if check_law(json.dumps(data)).yes:
+            wrong = false_law_statements(data)
+            verdict = f"VERIFIED, BUT FALSE: {wrong}" if wrong else "verified, and true"
+        found[verdict] += 1
+    print(dict(found), f"{time.process_time() - begin:.1f} s of the processor")
+
+
 def horseshoes(count: int) -> None:
     """Change a true horseshoe, and try to prove the statements that are false in 60 digits."""
     rng, found, begin = np.random.default_rng(29), Counter[str](), time.process_time()
@@ -303,6 +340,7 @@ def _certificates(rng: np.random.Generator) -> list[str]:
 if __name__ == "__main__":
     task, *counts = sys.argv[1:] or ["orbits"]
     tasks = {"orbits": orbits, "cheats": cheats, "models": models, "horseshoes": horseshoes}
+    tasks["laws"] = laws
     if task == "figures":
         figures(counts[0] if counts else ".")
     elif task in tasks:

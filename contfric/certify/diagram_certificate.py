@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from contfric.base.files import replacing
 from contfric.base.shown import Shown
-from contfric.errors import ResultFileError, path_of
+from contfric.errors import ResultFileError, did_you_mean, path_of
 
 _KIND, _FORMAT = "diagram", 1
 #: What a file holds that the checker does not look at.
@@ -296,7 +297,27 @@ def load_diagram_certificate(path: Any) -> DiagramCertificate:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data["certificate"] != _KIND or data["format"] != _FORMAT:
             raise ValueError(f"it is no certificate of a diagram of format {_FORMAT}")
-        found = data["summary"] | {"checkable": data["checkable"]}
+        _see_known(data, ("certificate", "format", "checkable", "summary", "unchecked", LEFT_OUT))
+        summary = data["summary"]
+        _see_known(summary, _names(DiagramCertificate) - {"checkable"})
+        for branch in summary["branches"]:
+            _see_known(branch, _names(BranchSummary))
+            for gap in branch["gaps"]:
+                _see_known(gap, _names(Gap))
+        for event in summary["events"]:
+            _see_known(event, _names(EventSummary))
+        found = summary | {"checkable": data["checkable"]}
         return TypeAdapter(DiagramCertificate).validate_python(found)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ResultFileError(f"cannot read {file}: {error}; give a certificate.json") from error
+
+
+def _names(kind: type) -> set[str]:
+    return {field.name for field in fields(kind)}
+
+
+def _see_known(entries: Iterable[str], known: Iterable[str]) -> None:
+    """Raise if there is an entry that nobody reads: pydantic ignores it."""
+    for name in entries:
+        if name not in set(known):
+            raise ValueError(f"there is no entry '{name}'{did_you_mean(name, sorted(known))}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,19 +41,29 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        If a file cannot state it: its model is unknown to the checker, or the orbit has holds.
+        If a file cannot state it (holds, a family of orbits), or the checker does not verify it.
     """
     orbit = certificate.orbit
-    if orbit.model.name not in CHECKED_MODELS or orbit.system.holds:
-        raise ParameterError(
-            f"certificate files are for orbits without holds of {', '.join(CHECKED_MODELS)}: "
-            "that is what the checker knows"
-        )
     if not certificate.exists.proved:
         raise ParameterError(f"there is nothing to write: {certificate.why}")
+    if orbit.model.name not in CHECKED_MODELS:
+        from contfric.certify.law_file import law_certificate
+
+        return law_certificate(certificate, lambda c: _orbit_data(c, lambda joints: joints))
+    if orbit.system.holds:
+        raise ParameterError(
+            f"certificate files of {', '.join(CHECKED_MODELS)} are for orbits without holds: "
+            "that is what the checker knows"
+        )
+    return _orbit_data(certificate, unknowns_of)
+
+
+def _orbit_data(certificate: Certificate, unknowns: Callable[..., list[Any]]) -> dict[str, Any]:
+    """Return a certificate as plain data, with the unknowns of some joints."""
+    orbit = certificate.orbit
     with working(certificate.precision):
-        radii = [float(r.upper()) * (1 + 1e-12) for r in unknowns_of(certificate.radii)]
-        balls = [_printed(x) for x in unknowns_of(certificate.enclosure)]
+        radii = [float(r.upper()) * (1 + 1e-12) for r in unknowns(certificate.radii)]
+        balls = [_printed(x) for x in unknowns(certificate.enclosure)]
         multipliers = [_disc(mu) for mu in sorted(certificate.multipliers, key=_rank)]
     proved = ("exists", "unique", "admissible", "stable")
     statements = [name for name in proved if getattr(certificate, name).proved]
@@ -67,7 +77,7 @@ def certificate_data(certificate: Certificate) -> dict[str, Any]:
         "periods": orbit.periods,
         "half": bool(orbit.system.half),
         "segments": [list(pair) for pair in orbit.system.itinerary],
-        "joints": unknowns_of(orbit.joints.ravel().tolist()),
+        "joints": unknowns(orbit.joints.ravel().tolist()),
         "radius": radii,
         "enclosure": balls,
         "multipliers": multipliers,
@@ -150,6 +160,8 @@ def checked(proof: Certificate | EventCertificate) -> tuple[dict[str, Any] | Non
 
     if not proof.proved:
         return None, "it is not proved"
+    if isinstance(proof, Certificate) and proof.orbit.model.name not in CHECKED_MODELS:
+        return None, "an orbit of a declared model has a file of its own only"
     try:
         data = certificate_data if isinstance(proof, Certificate) else event_data
         part = data(proof)  # type: ignore[arg-type] # each has its own
@@ -278,6 +290,13 @@ def _unstated(text: str) -> str:
     return ""
 
 
+def checked_text(text: str) -> Answer:
+    """Check a text by the checker that knows its kind: with a law of its own, or of a known model."""
+    from contfric.verify.piecewise import check_text as check_law
+
+    return (check_law if '"equations"' in text else check_text)(text)
+
+
 def verify(path: Any) -> Answer:
     """Check a certificate file by the independent checker.
 
@@ -297,7 +316,7 @@ def verify(path: Any) -> Answer:
         ) from error
     except UnicodeDecodeError:
         return Answer(False, f"{file.name} is no certificate: it is no text")
-    answer = check_text(text)
+    answer = checked_text(text)
     unstated = _unstated(text) if answer.yes else ""
     if unstated:
         return Answer(
@@ -309,7 +328,8 @@ def verify(path: Any) -> Answer:
     if not answer.yes and '"checkable": []' in text:  # of another model, or all orbits have holds
         why = (
             "it has no statement that is checked here. Checked are orbits without holds of the model "
-            f"{', '.join(CHECKED_MODELS)}, their events and branches; of others it has the summary only"
+            f"{', '.join(CHECKED_MODELS)}, their events and branches; of others it has the summary only "
+            "(an orbit of a declared model has a file of its own: orbit.certify().save)"
         )
         return answer._replace(why=why)
     return answer

@@ -72,6 +72,24 @@ def test_what_is_not_proved_has_its_place_and_reason() -> None:
         assert all(gap.why for gap in branch.gaps)
 
 
+@pytest.mark.parametrize(
+    "where", [(), ("summary",), ("summary", "branches", 0), ("summary", "events", 0)]
+)
+def test_an_entry_that_nobody_reads_is_refused(tmp_path: Path, where: tuple[Any, ...]) -> None:
+    """A wrong name would leave a default in the place of what was meant."""
+    path = tmp_path / "c.json"
+    proved().save(path)
+    data = json.loads(path.read_text())
+    part = data
+    for key in where:
+        part = part[key]
+    name = next(n for n in ("summary", "complete", "checkable", "ended") if n in part)
+    part[name + "d"] = part[name]
+    path.write_text(json.dumps(data))
+    with pytest.raises(cf.ContfricError, match=f"no entry '{name}d'; did you mean '{name}'"):
+        load_diagram_certificate(path)
+
+
 def test_saved_and_read(tmp_path: Path) -> None:
     proved().save(tmp_path / "c.json")
     assert load_diagram_certificate(tmp_path / "c.json") == proved()

@@ -68,8 +68,7 @@ def declared_balls(model: Model, params: Mapping[str, arb], free: str | None = N
     if model.integrated:
         named = "; ".join(f"mode {mode}: {why}" for mode, why in model.integrated.items())
         raise not_offered(model.name, f"it is integrated numerically ({named})")
-    modes = tuple(mode.name for mode in model.modes) if model.composed else ()
-    affine = affine_model(model.definition, modes, tuple(model.surface_by_name) if modes else ())
+    affine = affine_of(model)
     values = {affine.parameters[name]: ball for name, ball in params.items()}
     try:
         if free is None:
@@ -79,6 +78,12 @@ def declared_balls(model: Model, params: Mapping[str, arb], free: str | None = N
         return _evaluated(affine, values, slopes)
     except NotEnclosedError as error:
         raise not_offered(model.name, f"{error} is not enclosed") from None
+
+
+def affine_of(model: Model) -> AffineModel:
+    """Return a declared model in symbols; of a structure its modes that were visited."""
+    modes = tuple(mode.name for mode in model.modes) if model.composed else ()
+    return affine_model(model.definition, modes, tuple(model.surface_by_name) if modes else ())
 
 
 def not_offered(name: str, why: str) -> ParameterError:
