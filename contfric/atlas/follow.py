@@ -97,7 +97,7 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted, jumps, most = False, False, 0
     orbit = event.bifurcation.orbit
-    chatters = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
+    chatters = any(test.surface in orbit.model.fixed_sides for test in event.bifurcation.tests)
     if chatters or accumulates(event.bifurcation):
         why = _INCOMPLETE if chatters else _ACCUMULATE
         state.judge(event, "go on after the event", Decision.REFUSED, why=why)

@@ -106,7 +106,7 @@ def start_value(functions, layout, i, c, z, p, workspace):  # type: ignore[no-un
     n = z.shape[1] - 1
     apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     return functions.observe(
-        c, z[i, 0], workspace.behind[n, :n], p, workspace.none, workspace.empty
+        c, z[i, 0], workspace.after_reset[n, :n], p, workspace.none, workspace.empty
     )
 
 

@@ -93,7 +93,7 @@ def entry_rows(
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
             free = free and other.name not in model.wraps
-            free = free and other.name not in model.settled_sides
+            free = free and other.name not in model.fixed_sides
             if free and len(signs) == 1:
                 rows.append((i, k, signs.pop(), 1))
     return rows

@@ -321,7 +321,7 @@ made_of(Bifurcation, _parts, Bifurcation)
 
 def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
-    if surfaces & model.settled_sides.keys():
+    if surfaces & model.fixed_sides.keys():
         return "incomplete chatter"
     if kind is Kind.CS and not any(mode.sliding for mode in model.modes):
         return "corner: two surfaces are met at once"

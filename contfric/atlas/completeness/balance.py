@@ -145,7 +145,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit, test) for e in events for test in e.tests):
                 below = above = None
-            walls = [t for e in events for t in e.tests if t.surface in e.orbit.model.settled_sides]
+            walls = [t for e in events for t in e.tests if t.surface in e.orbit.model.fixed_sides]
             if walls or any(accumulates(e) for e in events):
                 below = above = None  # incomplete chatter: beyond it branches are infinitely many
             lost = any(_frees(e.orbit, test) for e in events for test in e.tests)

@@ -44,7 +44,7 @@ class ChatterMaps(SectionMaps):
         return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
 
     @cached_property
-    def settled_sides(self) -> dict[str, int]:
+    def fixed_sides(self) -> dict[str, int]:
         """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
         return {
             lift: self.domains_of(own.mode)[0].signs[lift]
