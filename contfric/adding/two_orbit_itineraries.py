@@ -101,9 +101,9 @@ def _possible(branches: dict[str, _Images], longest: int) -> Iterator[tuple[str,
         for letter, images in branches.items():
             longer = turns + letter
             if _may_be_least(longer):
-                behind = images.of(*left)
-                if len(behind[0]):
-                    waiting.append((longer, behind))
+                following = images.of(*left)
+                if len(following[0]):
+                    waiting.append((longer, following))
 
 
 class _Images:

@@ -86,10 +86,10 @@ def entry_rows(
             if met == surface
             for target in found
         }
-        behind = [d for d in mode_domains(model, itinerary[i][0]) if d in led]
+        landed = [d for d in mode_domains(model, itinerary[i][0]) if d in led]
         for k, other in enumerate(model.surfaces):
             signs = {
-                model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or behind)
+                model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or landed)
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
             free = free and other.name not in model.wraps

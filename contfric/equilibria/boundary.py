@@ -71,13 +71,13 @@ def partner_of(arc: Arc, point: CurvePoint) -> Partner:
         return Partner(Unfolding.DEGENERATE)
     region = others[0]
     product = product_of(arc.region, region, y, p)
-    beside = replace(arc, region=region)
-    inwards = _inwards(beside, y, arc.parameter(point.x))
+    on_each_side = replace(arc, region=region)
+    inwards = _inwards(on_each_side, y, arc.parameter(point.x))
     if inwards is None:
         return Partner(Unfolding.DEGENERATE, product=product)
     onwards = inwards.tangent[-1] * point.tangent[-1] > 0.0
     unfolding = Unfolding.PERSISTENCE if onwards else Unfolding.FOLD
-    return Partner(unfolding, (beside, inwards), region.mode, product)
+    return Partner(unfolding, (on_each_side, inwards), region.mode, product)
 
 
 def _rests(region: ModeRegion, arc: Arc, y: FloatArray, p: FloatArray) -> bool:

@@ -159,10 +159,10 @@ def _side_of_rates(
         rate = flow.rate(domain.mode, surface.observable, t, y)
         return domain.signs[surface.name] * rate > 0.0
 
-    beside = [
+    nearby = [
         d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
     ]
-    return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
+    return next((d.name for d in nearby if all(enters(d, s) for s in model.surfaces)), None)
 
 
 def displaced(model: Model, vector: FloatArray) -> FloatArray:

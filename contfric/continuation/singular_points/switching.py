@@ -84,7 +84,7 @@ def leave_along(
     return BranchStart(point, origin)
 
 
-def start_beside(orbit: Orbit, point: Point, settings: Settings, along: FloatArray) -> BranchStart:
+def start_nearby(orbit: Orbit, point: Point, settings: Settings, along: FloatArray) -> BranchStart:
     """Return a point next to a singular orbit as the start of a branch that leaves the orbit.
 
     Parameters

@@ -67,7 +67,7 @@ class Job:
     found: Found
     say: Say
 
-    def told(self, name: str) -> Say:
+    def progress_of(self, name: str) -> Say:
         """Return a function that takes lines of text of one step."""
         return lambda text: self.say(f"{name}: {text}")
 
