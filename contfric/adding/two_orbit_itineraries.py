@@ -1,4 +1,4 @@
-"""Which itineraries over two orbits can have a window: a necessary condition from the map of their release.
+"""Itineraries over two orbits that can have a window, by a necessary condition from their release map.
 
 Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.adding.release_map`). Its
 release is then in

@@ -1,4 +1,4 @@
-"""What leaves an event: the branches that each kind of bifurcation leads to.
+"""Finds and follows the branches that leave an event, by the kind of bifurcation.
 
 * CS, SS, AS, GS: every candidate that the transition graph proposes, bridges among them;
 * BP: the asymmetric branch from a symmetric one, or the symmetric branch from an asymmetric one;

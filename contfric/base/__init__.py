@@ -1,1 +1,1 @@
-"""What every package may use: files, YAML, tables, lazy names, interrupts, memory, optional packages."""
+"""Tools that every package may use: files, YAML, tables, lazy names, interrupts, memory."""

@@ -1,4 +1,4 @@
-"""What a boundary-value problem asks of each segment of an itinerary: its margins, its exit, its labels."""
+"""Assembles what a boundary-value problem asks of each segment: its margins, its exit, its labels."""
 
 from __future__ import annotations
 

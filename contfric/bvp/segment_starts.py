@@ -1,4 +1,4 @@
-"""How the segments of an itinerary begin: after a reset, on their own exit surface, or as any."""
+"""How each segment of an itinerary begins: after a reset, on its own exit surface, or as any other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the compiled cells take and fill: tables of a model, limits, and the rows of results."""
+"""Input and output of the compiled cells: tables of a model, limits, and the rows of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Boundary equilibria: a zero of one field reaches a surface, and goes on in another mode or turns back.
+r"""Boundary equilibria: an equilibrium reaches a surface, and persists in another mode or folds.
 
 Let ``f1`` hold where ``H > 0`` and have an equilibrium that reaches ``H = 0`` at ``p*``, ``N = f1_y``,
 ``C = H_y``, and let ``delta`` be the rate of H along its branch. On the other side holds ``f2``.

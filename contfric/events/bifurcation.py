@@ -1,4 +1,4 @@
-"""What can happen on a branch: kinds of bifurcation, ends, and how each is recognised.
+"""Bifurcations of a branch: their kinds, and the reasons for which a branch ends.
 
 Which sliding event a margin that reaches zero is: :mod:`contfric.events.sliding_kinds`.
 """

@@ -1,4 +1,4 @@
-"""Which kind of sliding event the vanishing of a margin is.
+"""Decides which kind of sliding event it is when a margin vanishes.
 
 A margin that reaches zero is a sliding event; which one follows from the model's definition alone:
 

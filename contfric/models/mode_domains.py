@@ -1,4 +1,4 @@
-"""What a model's definition says of its modes: their domains, the surfaces that bound them, their images.
+"""The domains of each mode, the surfaces that bound them, and their images.
 
 Modes of one field are one mode (:attr:`contfric.models.definition.Model.joined`). The name of a part of it
 stands in words only where a segment ends on the section between two parts: it says from which side.

@@ -1,4 +1,4 @@
-"""What follows where the touch that pins a hold splits: the same itinerary, pinned to the earlier touch.
+"""Continues a bridge where the touch that pins its hold splits: pinned to the earlier touch.
 
 See :mod:`contfric.events.split_touch`. The equations are singular there in the time of the pin, so that
 the orbits of the other side are looked for next to the event.

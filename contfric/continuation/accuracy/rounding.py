@@ -1,4 +1,4 @@
-"""How well the parameter of a located event is known: what rounding does to the equations of the event.
+"""Error bound of a located event's parameter, from the rounding errors of its equations.
 
 The equations of the orbit and that of the event fix the joints and the parameter together. Errors in these
 equations move the parameter by the last row of the inverse of their Jacobian. An error is what is left of

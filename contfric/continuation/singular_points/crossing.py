@@ -1,4 +1,4 @@
-"""Branch points: orbits at which two curves of orbits cross, with or without a declared symmetry.
+"""Branch points at which two curves of orbits cross, with or without a declared symmetry.
 
 The equations of the chain of segments are ``F(z, p) = 0``, N equations for N + 1 unknowns. Along a curve of
 orbits the Jacobian ``J = [F_z, F_p]`` has rank N, at a fold as well as elsewhere; where two curves cross its

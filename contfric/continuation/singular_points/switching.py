@@ -1,4 +1,4 @@
-"""What leaves a branch point or a period doubling.
+"""Orbits that leave a branch point or a period doubling.
 
 Where two curves of orbits of one problem cross, :mod:`contfric.continuation.singular_points.crossing` has
 their directions. At a branch point of a symmetric orbit the problem on the *whole* cycle, at fixed

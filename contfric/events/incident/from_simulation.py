@@ -1,4 +1,4 @@
-"""What follows an event as the flow itself says: the itineraries of solutions near it.
+"""Finds what follows an event by simulation: the itineraries of solutions near it.
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
 met at once), solutions near the orbit at the event have its itinerary or that of the orbit that takes over.

@@ -1,4 +1,4 @@
-"""Where a solution at rest could just not be left any more, and where a segment touches a surface.
+"""Times at which a resting solution is about to leave rest, or a segment touches a surface.
 
 Both are locations on one known segment, looked for once an event.
 """

@@ -1,4 +1,4 @@
-"""What follows an event of a structure with many contacts, if the return map is continuous.
+"""Outcomes of events of structures with many contacts, if the return map is continuous.
 
 The states of the contacts compose, so that the itinerary after an event follows from that before it. Where
 rest is left without acceleration (:attr:`contfric.models.definition.Model.filippov`) the solution is

@@ -1,4 +1,4 @@
-"""What can follow where a surface with a reset is grazed: an impact of speed zero comes in, or goes.
+"""Outcomes where a surface with a reset is grazed: an impact of zero speed appears or disappears.
 
 Where the impact changes the mode (a rocking block changes its foot) two of them do, with no time between.
 """

@@ -1,4 +1,4 @@
-"""What can follow a sliding event at one location of an orbit: the edit of its itinerary, and why.
+"""Outcomes of a sliding event at one location of an orbit: the edit of its itinerary, and the reason.
 
 The solution at the event is known, so the local structure of each outcome can be derived from it
 (``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.

@@ -1,4 +1,4 @@
-"""What formulas tell without a solution: names that nothing needs, defaults, unmarked kinks, two-folds."""
+"""Checks of formulas that need no solution: unused names, defaults, unmarked kinks, two-folds."""
 
 from __future__ import annotations
 

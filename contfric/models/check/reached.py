@@ -1,4 +1,4 @@
-"""Whether solutions come into every mode, and to states at which a model is at fault: simulations tell.
+"""Checks by simulation whether every mode is reached, and whether the model fails at states on the way.
 
 States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
 simulation meets such a fault, else a warning.

@@ -1,4 +1,4 @@
-"""Where a reset leads: the surfaces that its images lie on, and the sides to which motion leaves them.
+"""Derives where a reset leads: the surfaces that its images lie on, and the sides they leave them to.
 
 ``theta -> -theta`` at ``theta = alpha`` lands on ``theta = -alpha``; ``omega -> r omega`` at ``theta = 0``
 stays there and lets motion pass, ``omega -> -r omega`` sends it back. Found at sampled states that motion

@@ -1,4 +1,4 @@
-"""What a model says of its chatter: where impacts lead that come to rest, and what throws off a wall."""
+"""Look-up of a model's chatter: where impacts that come to rest lead, and what throws off a wall."""
 
 from __future__ import annotations
 

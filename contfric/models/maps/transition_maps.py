@@ -1,4 +1,4 @@
-"""What a model says of its transitions: the domain that follows each (domain, surface), and mirror images.
+"""Look-up of a model's transitions: the domain that follows each (domain, surface), and mirror images.
 
 A domain is a mode with the sides of all surfaces. Where modes overlap several domains have the same sides:
 motion stays in the mode that it is in while that holds.
