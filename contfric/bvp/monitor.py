@@ -1,4 +1,4 @@
-"""What is watched on a solved orbit: margins and labels, compiled.
+"""The margins and labels of a solved orbit, compiled.
 
 Admissibility cannot miss a violation: between its stationary points an observable is monotone, so
 the smallest distance to a bounding surface inside a segment is attained at a stationary point (or at
