@@ -228,7 +228,7 @@ def _kinks_of_resets(description: Description) -> set[str]:
 
     formulas = Formulas(description)
     images = [value for image in formulas.resets() for value in image]
-    found = {k for value in images for k in kinks_in(value, (formulas.t, *formulas.y))}
+    found = {k for value in images for k in kinks_in(value, formulas.moving)}
     kinks = {part for kink in found for part in branches_of(kink)}
     return {
         name

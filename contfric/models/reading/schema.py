@@ -236,7 +236,7 @@ class Jenkins(SchemaPart):
 
 
 class Spring(SchemaPart):
-    """A spring behind a gap."""
+    """A spring across a gap."""
 
     kind: Literal["spring"]
     gap: Expression
