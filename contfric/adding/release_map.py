@@ -28,7 +28,7 @@ from contfric.simulation.tables import surfaces_under
 
 #: Samples of each branch over its side of D; the first is next to the jump (in widths of the side), where
 #: perhaps only one branch is defined.
-_NODES, _BESIDE = 65, 1e-6
+_NODES, _NEARBY = 65, 1e-6
 #: Rounds in which D grows until it is mapped into itself, by so much more than the images ask for; samples of
 #: a side and parameters meanwhile. The side that it begins with, in periods.
 _MOST_ROUNDS, _MORE, _FEW, _FIRST = 40, 1.1, 9, 1e-9
@@ -175,7 +175,7 @@ class _Release:
     ) -> tuple[FloatArray, FloatArray]:
         """Return images and heights of the stop over a side of D, each of shape (parameters, count)."""
         s = np.linspace(0.0, end, count)
-        s[0] = _BESIDE * end
+        s[0] = _NEARBY * end
         found = np.array(
             [[self.after(letter, x, c + d) for d in s] for x, c in zip(grid, jumps, strict=True)]
         )

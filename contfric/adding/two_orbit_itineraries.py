@@ -1,4 +1,4 @@
-"""Which itineraries over two orbits can have a window: a necessary condition from the map of their release.
+"""Itineraries over two orbits that can have a window, by a necessary condition from their release map.
 
 Let ``w_1 ... w_k`` be the last turns of an orbit in D (:mod:`contfric.adding.release_map`). Its
 release is then in
@@ -101,9 +101,9 @@ def _possible(branches: dict[str, _Images], longest: int) -> Iterator[tuple[str,
         for letter, images in branches.items():
             longer = turns + letter
             if _may_be_least(longer):
-                behind = images.of(*left)
-                if len(behind[0]):
-                    waiting.append((longer, behind))
+                following = images.of(*left)
+                if len(following[0]):
+                    waiting.append((longer, following))
 
 
 class _Images:

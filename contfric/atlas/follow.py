@@ -1,4 +1,4 @@
-"""What leaves an event: the branches that each kind of bifurcation leads to.
+"""Finds and follows the branches that leave an event, by the kind of bifurcation.
 
 * CS, SS, AS, GS: every candidate that the transition graph proposes, bridges among them;
 * BP: the asymmetric branch from a symmetric one, or the symmetric branch from an asymmetric one;
@@ -97,7 +97,7 @@ def follow(state: Exploration, event: Event) -> None:
 def _follow_sliding(state: Exploration, event: Event) -> None:
     accepted, jumps, most = False, False, 0
     orbit = event.bifurcation.orbit
-    chatters = any(test.surface in orbit.model.settled_sides for test in event.bifurcation.tests)
+    chatters = any(test.surface in orbit.model.fixed_sides for test in event.bifurcation.tests)
     if chatters or accumulates(event.bifurcation):
         why = _INCOMPLETE if chatters else _ACCUMULATE
         state.judge(event, "go on after the event", Decision.REFUSED, why=why)

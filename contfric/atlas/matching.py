@@ -1,4 +1,4 @@
-"""Whether two orbits, or two events, are the same up to rotation and mirror image."""
+"""Tests whether two orbits, or two events, are the same up to rotation and mirror image."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What hot paths do in place of the standard library's own, which does more than they need."""
+"""Faster replacements for functions of the standard library that do more than hot code needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files whose content is checked before it is used, with its digest in them.
+"""Files that contain a digest of their content, which is checked before they are used.
 
 What a disk, a copy or a killed process has damaged is not used: whoever needs it makes it again, over it.
 """

@@ -1,4 +1,4 @@
-"""What this machine has: processors, and memory, into which what a user asks for must fit."""
+"""The number of processors and the free memory, and a check that a request fits into it."""
 
 from __future__ import annotations
 

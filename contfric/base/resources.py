@@ -1,4 +1,4 @@
-"""Where files are: those that ship with contfric, in a wheel or a source checkout; and the user's cache."""
+"""Locations of files: those that ship with contfric, and the user's cache."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How results look: a short table of attributes that cost nothing in a notebook, aligned columns as text."""
+"""How results are displayed: as a short table of attributes in a notebook, as aligned text elsewhere."""
 
 from __future__ import annotations
 

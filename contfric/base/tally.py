@@ -1,4 +1,4 @@
-"""What the kernels count of their work: for this process, and apart for what is computed in advance.
+"""Counts of the work of the kernels, for this process, and separately for what is computed in advance.
 
 A run reports the counts, and tests hold that nothing else was computed.
 """

@@ -11,4 +11,13 @@ costs as much as there are segments (:mod:`~contfric.bvp.cyclic`), and gives the
 return map, whose eigenvalues are the Floquet multipliers. A solution is *admissible* if no inequality is
 violated inside a segment; that is decided at all stationary points of the observables. See
 ``docs/numerics.md``.
+
+What to find where:
+
+* the problem of an itinerary: ``system`` (and ``assembly``, ``margins``, ``holds``, ``segment_starts``);
+* its equations: ``equations``, ``after_reset``, ``short_exits``, ``blocks``;
+* its solution: ``newton`` with ``convergence``, ``cyclic``; one orbit outside of the engine ``linear``;
+* inequalities: ``monitor``, ``stationary_points``, ``stationary_values``, ``crossed_surfaces``;
+* Floquet multipliers: ``spectrum``, ``pencil``, ``saltation``, ``passages``, ``conserved``;
+* derivatives of the joints: ``joint_derivatives``; orbits with given outcomes: ``prescribed_outcomes``.
 """

@@ -11,8 +11,10 @@ def apply_reset(functions, layout, i, start, p, which, workspace):  # type: igno
 
     Only for a segment that has one: elsewhere its joint is where it begins.
     """
-    n, behind = start.shape[0] - 1, workspace.behind
-    functions.reset(layout.resets[i], start[0], start[1:], p, which, behind[n, :n], behind[:n])
+    n, after_reset = start.shape[0] - 1, workspace.after_reset
+    functions.reset(
+        layout.resets[i], start[0], start[1:], p, which, after_reset[n, :n], after_reset[:n]
+    )
 
 
 @helper

@@ -1,4 +1,4 @@
-"""What a boundary-value problem asks of each segment of an itinerary: its margins, its exit, its labels."""
+"""Assembles what a boundary-value problem asks of each segment: its margins, its exit, its labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _event = cache(EventFunction)
 
 
 def following_modes(model: Model, itinerary: Itinerary, half: bool) -> list[str]:
-    """Return the mode after each segment of a turn; behind half an orbit it is the image of the first."""
+    """Return the mode after each segment of a turn; after half an orbit it is the image of the first."""
     first = mirror_mode(model)[itinerary[0][0]] if half else itinerary[0][0]
     return [*(mode for mode, _ in itinerary[1:]), first]
 

@@ -1,4 +1,4 @@
-"""What never changes along an orbit: where a contact rests that never slips, the offset of a stuck slider.
+"""Quantities that are constant along an orbit, such as the position of a contact that never slips.
 
 A linear function ``w . y`` whose rate vanishes in all modes of an itinerary keeps its value: the orbits form
 a continuum, with a multiplier 1 (-1 of a half turn, if the symmetry turns it over) for each such w, which is

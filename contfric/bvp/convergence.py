@@ -1,4 +1,4 @@
-"""When Newton's method has found its orbit: the rule that ends the iteration, compiled.
+"""The stopping rule of Newton's method, compiled.
 
 One rule ends the iteration for orbits, branches and curves (:func:`verdict`), on an estimate of its
 own error: with quadratic convergence the error after a correction of size d_k, following one of size d_{k-1},

@@ -70,7 +70,7 @@ class EquationWorkspace(NamedTuple):
     ----------
     state, jac : end of a segment with its derivatives, shapes (n,) and (n, 2 + n + q)
     between : a state within a segment, shape (n,)
-    behind : state after a reset, in the last row, and the derivatives of the reset, shape
+    after_reset : state after a reset, in the last row, and the derivatives of the reset, shape
         (n + 1, 1 + n + q)
     grad, level_grad : gradients of an observable and of a level, shapes (1 + n + q,) and (q,)
     rates : rate of the exit's observable at the end of each segment, shape (N,)
@@ -81,7 +81,7 @@ class EquationWorkspace(NamedTuple):
     state: FloatArray
     jac: FloatArray
     between: FloatArray
-    behind: FloatArray
+    after_reset: FloatArray
     grad: FloatArray
     level_grad: FloatArray
     rates: FloatArray
@@ -150,9 +150,9 @@ def segment_jacobian(functions, layout, i, start, duration, p, which, out, works
     if layout.resets[i] >= 0:
         n = state.shape[0]
         apply_reset(functions, layout, i, start, p, which, workspace)
-        begin = workspace.behind[n, :n]
+        begin = workspace.after_reset[n, :n]
         functions.flow(mode, start[0], begin, duration, p, which, state, out)
-        through_reset(out, workspace.behind, workspace.grad, n)
+        through_reset(out, workspace.after_reset, workspace.grad, n)
     else:
         functions.flow(mode, start[0], start[1:], duration, p, which, state, out)
 
@@ -211,10 +211,10 @@ def segment_rows(functions, layout, i, at, start, after, p, which, workspace, ro
     begin = start[1:]
     if layout.resets[i] >= 0:
         apply_reset(functions, layout, i, start, p, which, workspace)
-        begin = workspace.behind[n, :n]
+        begin = workspace.after_reset[n, :n]
     functions.flow(layout.modes[i], start[0], begin, after[0] - start[0], p, which, state, jac)
     if layout.resets[i] >= 0:
-        through_reset(jac, workspace.behind, grad, n)
+        through_reset(jac, workspace.after_reset, grad, n)
     worst = 0.0
     for j in range(n):
         row = m + j
@@ -270,7 +270,7 @@ def mismatch(functions, layout, z, p, workspace):  # type: ignore[no-untyped-def
         begin = z[i, 1:]
         if layout.resets[i] >= 0:
             apply_reset(functions, layout, i, z[i], p, none, workspace)
-            begin = workspace.behind[m - 1, : m - 1]
+            begin = workspace.after_reset[m - 1, : m - 1]
         functions.flow(layout.modes[i], z[i, 0], begin, duration, p, none, state, workspace.nothing)
         if layout.pins[i] != NO_PIN:
             here = abs(pin_value(functions, layout, i, z[i], p, none, empty))

@@ -1,4 +1,4 @@
-"""How the joints of an orbit move with its parameters, by the elimination of Newton's method, compiled."""
+"""Derivatives of an orbit's joints by its parameters, by the elimination of Newton's method, compiled."""
 
 from __future__ import annotations
 

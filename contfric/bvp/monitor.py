@@ -1,4 +1,4 @@
-"""What is watched on a solved orbit: margins and labels, compiled.
+"""The margins and labels of a solved orbit, compiled.
 
 Admissibility cannot miss a violation: between its stationary points an observable is monotone, so
 the smallest distance to a bounding surface inside a segment is attained at a stationary point (or at
@@ -106,7 +106,7 @@ def start_value(functions, layout, i, c, z, p, workspace):  # type: ignore[no-un
     n = z.shape[1] - 1
     apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
     return functions.observe(
-        c, z[i, 0], workspace.behind[n, :n], p, workspace.none, workspace.empty
+        c, z[i, 0], workspace.after_reset[n, :n], p, workspace.none, workspace.empty
     )
 
 

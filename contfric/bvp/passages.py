@@ -1,4 +1,4 @@
-"""What the field does at a joint: nothing, a change along one direction as sliding begins, or a jump.
+"""The field at a joint: unchanged, changed along one direction as sliding begins, or with a jump.
 
 Judged at random states on the surface between two modes, on which both slide as they do.
 """

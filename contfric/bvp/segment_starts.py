@@ -1,4 +1,4 @@
-"""How the segments of an itinerary begin: after a reset, on their own exit surface, or as any."""
+"""How each segment of an itinerary begins: after a reset, on its own exit surface, or as any other."""
 
 from __future__ import annotations
 
@@ -86,14 +86,14 @@ def entry_rows(
             if met == surface
             for target in found
         }
-        behind = [d for d in mode_domains(model, itinerary[i][0]) if d in led]
+        landed = [d for d in mode_domains(model, itinerary[i][0]) if d in led]
         for k, other in enumerate(model.surfaces):
             signs = {
-                model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or behind)
+                model.domain_by_name[d].signs[other.name] for d in (domains[i : i + 1] or landed)
             }
             free = model.changed_by(reset, other.name) and other.name not in reset.lands
             free = free and other.name not in model.wraps
-            free = free and other.name not in model.settled_sides
+            free = free and other.name not in model.fixed_sides
             if free and len(signs) == 1:
                 rows.append((i, k, signs.pop(), 1))
     return rows

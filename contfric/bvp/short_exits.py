@@ -42,8 +42,8 @@ def mean_rate_row(functions, layout, i, at, start, duration, p, which, workspace
         share, weight = _NODES[k], _WEIGHTS[k]
         time = share * duration
         if layout.resets[i] >= 0:
-            functions.flow(mode, start[0], workspace.behind[n, :n], time, p, which, state, jac)
-            through_reset(jac, workspace.behind, grad, n)
+            functions.flow(mode, start[0], workspace.after_reset[n, :n], time, p, which, state, jac)
+            through_reset(jac, workspace.after_reset, grad, n)
         else:
             functions.flow(mode, start[0], start[1:], time, p, which, state, jac)
         mean += weight * functions.rate(mode, c, start[0] + time, state, p, which, grad)
@@ -82,7 +82,7 @@ def is_divided(functions, layout, i, start, duration, p, which, workspace):  # t
     begin, change = start[1:], 0.0
     if layout.resets[i] >= 0:
         apply_reset(functions, layout, i, start, p, which, workspace)
-        begin = workspace.behind[n, :n]
+        begin = workspace.after_reset[n, :n]
     for k in range(_NODES.shape[0]):
         time = _NODES[k] * duration
         functions.flow(mode, start[0], begin, time, p, none, state, nothing)

@@ -46,7 +46,7 @@ def find_after_reset(functions, layout, i, c, z, p, workspace, stationary):  # t
     after, n = z[i + 1] if i + 1 < z.shape[0] else workspace.last, z.shape[1] - 1
     duration = after[0] - z[i, 0]
     apply_reset(functions, layout, i, z[i], p, workspace.none, workspace)
-    begin = workspace.behind[n, :n]
+    begin = workspace.after_reset[n, :n]
     return functions.stationary(
         layout.modes[i], c, z[i, 0], begin, duration, p, stationary.times, stationary.values
     )

@@ -1,4 +1,4 @@
-"""What a search of the census is asked for, and what it leaves."""
+"""The arguments of a census search, and the state from which it can continue."""
 
 from __future__ import annotations
 

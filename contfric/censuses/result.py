@@ -1,4 +1,4 @@
-"""What a census found, what it tried, and what ended it."""
+"""The result of a census: the orbits found, what was tried, and why it ended."""
 
 from __future__ import annotations
 

@@ -51,9 +51,10 @@ CellRowsType = types.NamedTuple([matrix, matrix, indices, indices, indices], Cel
 #: Solutions that are followed side by side: enough for the vectors of a processor, and few enough that what
 #: is kept of each stays near it.
 SIDE_BY_SIDE = 32
-#: The mode of a place without a motion, and how far a motion is: before the averages, in them, or behind.
+#: The mode of a place without a solution; the stages of a solution: before its exponents are averaged, while
+#: they are, and the periods after that in which it may still prove periodic.
 IDLE = -1
-BEFORE, AVERAGING, BEHIND = range(3)
+BEFORE, AVERAGING, CONFIRMING = range(3)
 
 
 class Solutions(NamedTuple):
@@ -154,7 +155,7 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
         if turns > 0 and averaged(
             averages, live, turns, cycle >= solutions.end[k], limits.tolerance, rows, cell
         ):
-            solutions.stage[k], solutions.end[k] = BEHIND, cycle + limits.confirm
+            solutions.stage[k], solutions.end[k] = CONFIRMING, cycle + limits.confirm
     elif solutions.stage[k] == BEFORE and cycle >= limits.transient:
         solutions.stage[k], solutions.end[k] = AVERAGING, cycle + limits.periods
         seed(workspaces.frame, live)  # what only the transient forgot counts again
@@ -171,7 +172,7 @@ def go_on(functions, tables, ranks, solutions, k, limits, workspaces, rows):  # 
         lowest,
         rise,
     )
-    return solutions.stage[k] == BEHIND and cycle >= solutions.end[k]
+    return solutions.stage[k] == CONFIRMING and cycle >= solutions.end[k]
 
 
 @helper

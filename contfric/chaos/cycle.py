@@ -27,7 +27,7 @@ from contfric.bvp.spectrum import spectrum
 from contfric.chaos.tangent import (
     ARRIVED,
     Transit,
-    behind,
+    carry_after_joint,
     differentiate,
     forget_events,
     is_autonomous,
@@ -231,8 +231,8 @@ def go_round(functions, tables, ranks, mode, on, joints, p, period, cycle, works
         push(frame, rank, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
         if reset or is_autonomous(transit):
-            behind(functions, surface, t, p, images, n + 1, transit, workspace, reset)
-            behind(functions, surface, t, p, frame, rank, transit, workspace, reset)
+            carry_after_joint(functions, surface, t, p, images, n + 1, transit, workspace, reset)
+            carry_after_joint(functions, surface, t, p, frame, rank, transit, workspace, reset)
         lasted += duration
         if not orthonormalise(frame, rank, cycle.growth):
             return -1, rank, turns, t, lasted

@@ -1,4 +1,4 @@
-"""How the following of a solution ends, and what is then written for it; compiled.
+"""The ways in which following a solution can end, and the results written for each; compiled.
 
 A motion that becomes periodic, and one that is averaged, end in :mod:`contfric.chaos.cells`. Here are those
 that come to rest, that no surface cuts any more, and that have no exponents.

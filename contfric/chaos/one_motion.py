@@ -18,7 +18,7 @@ from contfric.chaos.endings import (
 from contfric.chaos.tangent import (
     ARRIVED,
     any_time,
-    behind,
+    carry_after_joint,
     differentiate,
     is_autonomous,
     orthonormalise,
@@ -107,7 +107,9 @@ def carry_through_reset(functions, tables, ranks, mode, on, t, p, period, live, 
         push(workspaces.frame, live, rate, transit.jac, transit.grad, transit.image)
         reset = tables.bounds[mode, surface] == 2
         if reset or is_autonomous(transit):
-            behind(functions, surface, t, p, workspaces.frame, live, transit, workspace, reset)
+            carry_after_joint(
+                functions, surface, t, p, workspaces.frame, live, transit, workspace, reset
+            )
         if not orthonormalise(workspaces.frame, live, workspaces.growth):
             outcome = BROKEN
     return outcome, surface, following, duration, turns, t, live

@@ -1,4 +1,4 @@
-"""What the compiled cells take and fill: tables of a model, limits, and the rows of results."""
+"""Input and output of the compiled cells: tables of a model, limits, and the rows of results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Starting(NamedTuple):
     first : domain that the signs say, as a row of ``sides``, -1 if none, shape (3 ** surfaces,)
     own, sides : mode of each domain but chatter, shape (domains,), and its sides of all surfaces, shape
         (domains, surfaces); those first that lie on most
-    settled : side of surfaces that a state is always on one side of, 0 of others, shape (surfaces,)
+    fixed_sides : side of surfaces that a state is always on one side of, 0 of others, shape (surfaces,)
     cuts : whether motion is cut at a surface in all modes, shape (surfaces,)
     widths, unit : what the sizes of states and the unit of time are told by, as in
         :mod:`contfric.simulation.entered_domain`, at the default parameters; shape (n,), and a number
@@ -40,7 +40,7 @@ class Starting(NamedTuple):
     first: IntArray
     own: IntArray
     sides: IntArray
-    settled: IntArray
+    fixed_sides: IntArray
     cuts: IntArray
     widths: FloatArray
     unit: float
@@ -99,7 +99,7 @@ def starting(model: Model) -> Starting:
     for signs in product((-1, 0, 1), repeat=len(surfaces)):
         code = sum((sign + 1) * 3**k for k, sign in enumerate(signs))
         named = dict(zip(surfaces, signs, strict=True))
-        domain = model.domain_at({**named, **model.settled_sides})
+        domain = model.domain_at({**named, **model.fixed_sides})
         if domain is None:
             continue
         first[code] = rows.get(domain, -1)
@@ -110,9 +110,9 @@ def starting(model: Model) -> Starting:
     ranks = [m.rank - int(model.autonomous) for m in model.modes]
     own = [model.mode_index[d.own_mode] for d in domains]
     sides = [[d.signs[k] for k in surfaces] for d in domains]
-    settled, cuts = (
+    fixed_sides, cuts = (
         np.array(list(map(of, surfaces)), dtype=np.int64)
-        for of in (lambda k: model.settled_sides.get(k, 0), model.cuts)
+        for of in (lambda k: model.fixed_sides.get(k, 0), model.cuts)
     )
     defaults = model.vector({})
     return Starting(
@@ -122,7 +122,7 @@ def starting(model: Model) -> Starting:
         first,
         np.array(own, dtype=np.int64),
         np.array(sides, dtype=np.int64).reshape(len(own), len(surfaces)),
-        settled,
+        fixed_sides,
         cuts,
         np.abs(np.asarray(model.spread(model.mapping(defaults)), dtype=np.float64)),
         max(clock_period(model, defaults), time_scale(model)),

@@ -27,7 +27,7 @@ def code_on(functions, tables, starting, exact, t, y, p, workspace):  # type: ig
     """Return (row of a state, with zeros for the surfaces that it lies on to rounding; these as bits)."""
     code, place, on = exact, 1, 0
     for k in range(tables.observables.shape[0]):
-        if starting.settled[k] == 0:
+        if starting.fixed_sides[k] == 0:
             c = tables.observables[k]
             value = functions.observe(c, t, y, p, workspace.none, workspace.empty)
             value -= functions.level(k, p, workspace.none, workspace.empty)
@@ -43,8 +43,8 @@ def code_on(functions, tables, starting, exact, t, y, p, workspace):  # type: ig
 def fits_domain(starting, d, code):  # type: ignore[no-untyped-def]
     """Tell whether a domain is on the sides of all surfaces that a state is not on."""
     rest = code
-    for k in range(starting.settled.shape[0]):
-        side = starting.settled[k] if starting.settled[k] != 0 else rest % 3 - 1
+    for k in range(starting.fixed_sides.shape[0]):
+        side = starting.fixed_sides[k] if starting.fixed_sides[k] != 0 else rest % 3 - 1
         if side != 0 and side != starting.sides[d, k]:
             return False
         rest //= 3

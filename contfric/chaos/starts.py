@@ -1,4 +1,4 @@
-"""Where solutions start: the state given, one that depends on the parameters, or several."""
+"""Initial states of solutions: a given state, one that depends on the parameters, or several."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solution turned out to be."""
+"""The kinds of motion that a followed solution can turn out to be."""
 
 from __future__ import annotations
 

@@ -287,7 +287,7 @@ def differentiate(functions, observable, mode, duration, t, p, transit, none):  
 
 
 @helper
-def behind(functions, surface, t, p, frame, count, transit, workspace, reset):  # type: ignore[no-untyped-def]
+def carry_after_joint(functions, surface, t, p, frame, count, transit, workspace, reset):  # type: ignore[no-untyped-def]
     """Carry the first rows of a frame after a joint: over its reset, or in no time without one."""
     if reset:
         functions.reset(surface, t, workspace.after, p, workspace.none, transit.end, transit.jac)

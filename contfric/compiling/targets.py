@@ -1,4 +1,4 @@
-"""What machine code depends on besides its sources: Python, numba, llvmlite, the platform and the processor.
+"""What machine code depends on in addition to its sources: Python, numba, llvmlite and the processor.
 
 Code that a user's machine compiles is for its processor. Code that comes with a wheel runs on other
 machines too. It is compiled for a *baseline*, and used wherever all features of that are there: the engine

@@ -160,8 +160,8 @@ def _without_critical_ends(branch: Branch, settings: Settings) -> Branch:
         if last is None or last.kind is not Kind.AS:
             continue
         apart = np.abs(branch.arc - branch.arc[k])
-        beside = np.abs(found[(apart > 0.0) & (apart < _NEAR_END)])
-        if not np.any(np.abs(beside - 1.0) < _CRITICAL):
+        nearby = np.abs(found[(apart > 0.0) & (apart < _NEAR_END)])
+        if not np.any(np.abs(nearby - 1.0) < _CRITICAL):
             continue
         for b in branch.bifurcations:
             gap = abs(b.params[branch.parameter] - last.params[branch.parameter]) / settings.width

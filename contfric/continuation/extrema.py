@@ -151,11 +151,11 @@ class _ExtremumSearch:
 
 def _nearest(slopes: FloatArray) -> Iterator[float]:
     """Yield the shares of a step at which parabolas through three slopes come near to zero inside of it."""
-    before, p, q, behind = (float(slope) for slope in slopes)
+    before, p, q, following = (float(slope) for slope in slopes)
     if p * q <= 0.0:
         return
     # in p + b x + c x^2 over the step: through the point at -1, or through that at 2
-    for c in (0.5 * (before - 2.0 * p + q), 0.5 * (p - 2.0 * q + behind)):
+    for c in (0.5 * (before - 2.0 * p + q), 0.5 * (p - 2.0 * q + following)):
         b = q - p - c
         x = -0.5 * b / c if c != 0.0 and np.isfinite(c) else np.nan
         if 0.0 < x < 1.0 and (p + 0.5 * b * x) * np.sign(p) < _NEAR * min(abs(p), abs(q)):
@@ -198,8 +198,8 @@ def extrema_of(branch: Branch, name: QuantityLike) -> tuple[Extremum, ...]:
 
 def _flat_end(slopes: FloatArray) -> bool:
     """Tell whether a step has an end of the branch at which the slope is zero; slopes as for ``dipping``."""
-    before, p, q, behind = np.abs(slopes)
-    return bool((np.isnan(before) and p < _ZERO * q) or (np.isnan(behind) and q < _ZERO * p))
+    before, p, q, following = np.abs(slopes)
+    return bool((np.isnan(before) and p < _ZERO * q) or (np.isnan(following) and q < _ZERO * p))
 
 
 def settings_of(branch: Branch) -> Settings:

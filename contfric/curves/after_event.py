@@ -1,4 +1,4 @@
-"""What a curve becomes after another sliding event: the same condition in an edited itinerary.
+"""Continues a curve past another sliding event: the same condition in an edited itinerary.
 
 At the event the motion is known, and every itinerary that can follow it solves the same equations there
 (:mod:`contfric.events.incident.candidates`). The condition is found again in the new itinerary by its place:

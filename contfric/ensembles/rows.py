@@ -1,4 +1,4 @@
-"""What is kept of each diagram of an ensemble: its events, and a quantity of its branches at fixed values."""
+"""What an ensemble stores of each diagram: its events, and a quantity of its branches at fixed values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-r"""Boundary equilibria: a zero of one field reaches a surface, and goes on in another mode or turns back.
+r"""Boundary equilibria: an equilibrium reaches a surface, and persists in another mode or folds.
 
 Let ``f1`` hold where ``H > 0`` and have an equilibrium that reaches ``H = 0`` at ``p*``, ``N = f1_y``,
 ``C = H_y``, and let ``delta`` be the rate of H along its branch. On the other side holds ``f2``.
@@ -71,13 +71,13 @@ def partner_of(arc: Arc, point: CurvePoint) -> Partner:
         return Partner(Unfolding.DEGENERATE)
     region = others[0]
     product = product_of(arc.region, region, y, p)
-    beside = replace(arc, region=region)
-    inwards = _inwards(beside, y, arc.parameter(point.x))
+    on_each_side = replace(arc, region=region)
+    inwards = _inwards(on_each_side, y, arc.parameter(point.x))
     if inwards is None:
         return Partner(Unfolding.DEGENERATE, product=product)
     onwards = inwards.tangent[-1] * point.tangent[-1] > 0.0
     unfolding = Unfolding.PERSISTENCE if onwards else Unfolding.FOLD
-    return Partner(unfolding, (beside, inwards), region.mode, product)
+    return Partner(unfolding, (on_each_side, inwards), region.mode, product)
 
 
 def _rests(region: ModeRegion, arc: Arc, y: FloatArray, p: FloatArray) -> bool:

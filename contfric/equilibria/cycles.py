@@ -180,12 +180,12 @@ def _sections(event: HopfPoint) -> Iterator[tuple[str, tuple[str, str]]]:
     for surface in at.model.surfaces:
         sides = {}
         for domain in at.region.domains:
-            beside = all(
+            nearby = all(
                 near[s] == 0.0 or near[s] * side > 0.0
                 for s, side in at.region.sides(domain).items()
                 if s != surface.name
             )
-            if beside:
+            if nearby:
                 sides[domain.signs[surface.name]] = domain.own_mode
         if set(sides) == {1, -1} and sides[1] != sides[-1]:
             yield surface.name, (sides[1], sides[-1])

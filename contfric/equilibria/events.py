@@ -1,4 +1,4 @@
-"""What happens along a branch of equilibria: folds, branch points, Hopf points, boundary equilibria."""
+"""Events on a branch of equilibria: folds, branch points, Hopf points, boundary equilibria."""
 
 from __future__ import annotations
 

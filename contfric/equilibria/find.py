@@ -120,8 +120,8 @@ def _of_region(
 def _goes_on(zeros: Zeros, y: FloatArray, direction: FloatArray) -> bool:
     """Tell whether there is another zero near a singular one: a whole set of them, not a fold."""
     length = 1e-3 * float(np.min(zeros.scale))
-    beside = zeros.newton(y + length * direction)
-    return beside is not None and float((beside - y) @ direction) > 0.5 * length
+    nearby = zeros.newton(y + length * direction)
+    return nearby is not None and float((nearby - y) @ direction) > 0.5 * length
 
 
 def _unwound(model: Model, y: FloatArray) -> FloatArray:

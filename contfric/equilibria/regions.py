@@ -1,4 +1,4 @@
-"""Where each field of a model holds: its region, the surfaces that bound it, and whether a state is inside.
+"""The region of each field: the surfaces that bound it, and whether a state is inside.
 
 Modes of one field are one mode (:mod:`contfric.models.deriving.sections`): a section through an equilibrium
 means nothing to it. A mode with kinks has a region for each combination of their sides.

@@ -1,4 +1,4 @@
-"""Whether the impacts before a graze follow each other as those of a chatter do.
+"""Tests whether the impacts before a grazing point accumulate as in chatter.
 
 Where a mass is pressed to a wall, impacts come ever closer and slower. A parameter may bring the end of such
 a chatter to the time at which the wall lets go, where the acceleration is ``-k s`` at a time s before. There

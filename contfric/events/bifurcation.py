@@ -1,4 +1,4 @@
-"""What can happen on a branch: kinds of bifurcation, ends, and how each is recognised.
+"""Bifurcations of a branch: their kinds, and the reasons for which a branch ends.
 
 Which sliding event a margin that reaches zero is: :mod:`contfric.events.sliding_kinds`.
 """
@@ -321,7 +321,7 @@ made_of(Bifurcation, _parts, Bifurcation)
 
 def meaning_of(kind: Kind, model: Model, surfaces: Set[str]) -> str:
     """Return what happens at an event on surfaces of a model: a sliding only where something slides."""
-    if surfaces & model.settled_sides.keys():
+    if surfaces & model.fixed_sides.keys():
         return "incomplete chatter"
     if kind is Kind.CS and not any(mode.sliding for mode in model.modes):
         return "corner: two surfaces are met at once"

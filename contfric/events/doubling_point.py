@@ -39,7 +39,7 @@ _FAR = 1e-2
 _SECANTS = 40
 #: Distance in the parameter at which a multiplier that passes -1 is told from one that touches it; and a
 #: shorter one, where a fold is so near that there is no orbit on one side.
-_BESIDE = (1e-6, 1e-8, 1e-10)
+_NEARBY = (1e-6, 1e-8, 1e-10)
 #: What vanishes at an opening is the difference of matrices of order 1: its rounding, with some reserve.
 _ROUNDING = 1e-13
 #: Odd parts below this are rounding: away from a vertex the orbit is symmetric (undoubled). Orbits with
@@ -94,19 +94,19 @@ def opens_through(orbit: Orbit, active: int) -> bool:
     that becomes tangential it passes -1 and then infinity: a shorter way tells that it passes. Where a fold
     is so near that there is no orbit on one side of the parameter the curve of orbits is asked.
     """
-    value, told = float(orbit.vector[active]), False
+    value, decided = float(orbit.vector[active]), False
     size = orbit.model.size_of(active, value)
-    for beside in _BESIDE:
-        offset = beside * size
+    for share in _NEARBY:
+        offset = share * size
         sides = [opening(moved(orbit, active, value + s * offset)) for s in (-1.0, 1.0)]
         if np.isfinite(sides).all() and min(np.abs(sides)) > _ROUNDING:
-            told = True
+            decided = True
             if sides[0] * sides[1] < 0.0:
                 return True
-    if told:
+    if decided:
         return False
     line = Line.through(orbit, active)
-    along = [] if line is None else [line.at(s * _BESIDE[0]) for s in (-1.0, 1.0)]
+    along = [] if line is None else [line.at(s * _NEARBY[0]) for s in (-1.0, 1.0)]
     sides = [opening(there) for there in along if there is not None]
     return len(sides) == 2 and sides[0] * sides[1] < 0.0
 
@@ -118,17 +118,17 @@ def location_error(orbit: Orbit, active: int) -> float:
     second order counts. Infinite where there is no curve.
     """
     line = Line.through(orbit, active)
-    sides = [] if line is None else [line.at(s * _BESIDE[0]) for s in (-1.0, 1.0)]
+    sides = [] if line is None else [line.at(s * _NEARBY[0]) for s in (-1.0, 1.0)]
     if len(sides) != 2 or None in sides:
         return np.inf
     (low, high) = (side for side in sides if side is not None)
-    slope = abs(opening(high) - opening(low)) / (2.0 * _BESIDE[0])
+    slope = abs(opening(high) - opening(low)) / (2.0 * _NEARBY[0])
     if not slope > 0.0:
         return np.inf
     off = (abs(opening(orbit)) + _ROUNDING) / slope
     values = [float(o.vector[active]) for o in (low, orbit, high)]
-    rise = abs(values[2] - values[0]) / (2.0 * _BESIDE[0])
-    bend = abs(values[2] - 2.0 * values[1] + values[0]) / _BESIDE[0] ** 2
+    rise = abs(values[2] - values[0]) / (2.0 * _NEARBY[0])
+    bend = abs(values[2] - 2.0 * values[1] + values[0]) / _NEARBY[0] ** 2
     return rise * off + bend * off * off
 
 

@@ -1,4 +1,4 @@
-"""What an event belongs to, and how its location moves with the other parameters."""
+"""The contacts at which an event happens, and derivatives of its location by the other parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which kind of sliding event the vanishing of a margin is.
+"""Decides which kind of sliding event it is when a margin vanishes.
 
 A margin that reaches zero is a sliding event; which one follows from the model's definition alone:
 
@@ -8,7 +8,7 @@ margin     where                                   kind
 interior   segment that stays on a surface         AS: the stick touches its limit inside; GS where the
                                                    surface is another contact's, and the stick goes on
 interior   other segment, surface that switches    GS: the slide touches rest inside, a slider its limit
-interior   surface with the same field behind      T
+interior   surface with the same field after it    T
 any        surface with a reset in the mode        GS: a grazing impact
 exit       as the interior of the same segment     AS, GS or T: the exit becomes tangential
 joint      a reset chooses its mode by that side   SS: the map jumps (entry: the same)
@@ -113,8 +113,8 @@ def beginning_of(test: EventFunction, orbit: Orbit) -> int | None:
     k, itinerary = test.segment, orbit.itinerary
     if len(itinerary) < 3:
         return None
-    before, behind = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
-    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
+    before, following = (itinerary[j % len(itinerary)][0] for j in (k - 1, k + 1))
+    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(following)
     vanished = bool(orbit.durations[k] < _VANISHED * orbit.period)
     return (k - 1) % len(itinerary) if same and vanished and nothing_jumps(orbit) else None
 
@@ -132,9 +132,9 @@ def hold_of_test(test: EventFunction, orbit: Orbit) -> Hold | None:
             return hold
         if hold.until is not None:
             continue
-        behind = (hold.segment + 1) % len(orbit.system.itinerary)
-        if test.segment == behind and test.margin is not Margin.JOINT:
-            duration = orbit.durations[behind]
+        following = (hold.segment + 1) % len(orbit.system.itinerary)
+        if test.segment == following and test.margin is not Margin.JOINT:
+            duration = orbit.durations[following]
             if duration < _VANISHED * orbit.period:
                 return hold
     return None
@@ -187,7 +187,7 @@ def outward_rate(resting: Domain, test: EventFunction, orbit: Orbit) -> float:
 
 
 def _leaves(resting: Domain, test: EventFunction, orbit: Orbit) -> bool:
-    """Tell whether rest is left behind a stop on its limit (CS), and not entered (SS).
+    """Tell whether rest is left after a stop on its limit (CS), and not entered (SS).
 
     A load that stands still at the stop grows after it where it has its minimum: a stick around the minimum
     shrinks to nothing there, and the map is continuous. At its maximum motion from below is held.
@@ -214,7 +214,7 @@ def load_stands_still(orbit: Orbit, test: EventFunction) -> bool:
     if not _stands_still(outward_rate(resting, test, orbit), resting, test, orbit):
         return False
     end = orbit.ends[test.segment]
-    rates = _rates_beside(orbit, resting.mode, test.surface, end)
+    rates = _rates_around(orbit, resting.mode, test.surface, end)
     return any(rate != 0.0 for rate in rates)
 
 
@@ -223,13 +223,13 @@ def bends_outward(orbit: Orbit, mode: str, surface: str, inside: int, joint: Flo
 
     ``inside`` is the sign of the surface within it.
     """
-    before, behind = _rates_beside(orbit, mode, surface, joint)
-    return inside * (behind - before) < 0.0
+    before, following = _rates_around(orbit, mode, surface, joint)
+    return inside * (following - before) < 0.0
 
 
-def _rates_beside(orbit: Orbit, mode: str, surface: str, joint: FloatArray) -> tuple[float, float]:
+def _rates_around(orbit: Orbit, mode: str, surface: str, joint: FloatArray) -> tuple[float, float]:
     """Return the rates of a load a moment before and after a joint, at its state."""
     later = np.zeros_like(joint)
     later[0] = _LATER * (1.0 + orbit.period)
-    before, behind = (rate_along(orbit, mode, surface, joint + s * later) for s in (-1.0, 1.0))
-    return before, behind
+    before, following = (rate_along(orbit, mode, surface, joint + s * later) for s in (-1.0, 1.0))
+    return before, following

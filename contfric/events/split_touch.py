@@ -1,4 +1,4 @@
-"""Where the touch that a hold is pinned to splits into two of equal height.
+"""Points at which the touch that a hold is pinned to splits into two of equal height.
 
 A stick ends where its load u touches the limit, and a hold goes on. The touch is a maximum, ``u' = 0``. Under
 an even excitation it may lie where u is even in time: with e the distance of the parameter from the location

@@ -1,4 +1,4 @@
-"""What was measured: values of quantities, and time series of periodic motion."""
+"""Measured data for a fit: values of quantities, and time series of periodic motion."""
 
 from __future__ import annotations
 

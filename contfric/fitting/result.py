@@ -1,4 +1,4 @@
-"""What a fit has found: parameters with their covariance, and the predictions for each measurement."""
+"""The result of a fit: parameters with covariance, and the predictions for each measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What compiled code finds after a handle: the functions of a flow, and those of a model.
+"""The functions and tables that compiled code finds after a handle: those of a flow, and of a model.
 
 The signatures of the functions stand in :mod:`contfric.compiled`.
 """

@@ -1,4 +1,4 @@
-"""What a model's definition says of its modes: their domains, the surfaces that bound them, their images.
+"""The domains of each mode, the surfaces that bound them, and their images.
 
 Modes of one field are one mode (:attr:`contfric.models.definition.Model.joined`). The name of a part of it
 stands in words only where a segment ends on the section between two parts: it says from which side.
@@ -49,7 +49,7 @@ def open_ends(model: Model, mode: str) -> tuple[str, ...]:
     own, found = [d for d in model.domains if d.own_mode == mode], []
     for surface in (s.name for s in model.surfaces if s.name not in _met(model)[mode]):
         sides = {d.signs[surface] for d in own}
-        if surface in model.settled_sides or len(sides) != 1 or sides == {0}:
+        if surface in model.fixed_sides or len(sides) != 1 or sides == {0}:
             continue
         beyond = ({**d.signs, surface: -d.signs[surface]} for d in own)
         if any(is_possible(list(model.surfaces), signs) for signs in beyond):
@@ -100,7 +100,7 @@ def ending_sides(
     if mode in model.chatter_by_mode:  # at rest on a wall, on whichever side of a section
         return {}
     found = {}
-    for name in model.surface_by_name.keys() - model.settled_sides.keys():
+    for name in model.surface_by_name.keys() - model.fixed_sides.keys():
         signs = {model.domain_by_name[d].signs[name] for d in inside}
         if len(signs) == 1:
             found[name] = signs.pop()

@@ -109,13 +109,13 @@ class Lead:
     after: tuple[str, ...] = ()
 
 
-def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Domain]:
+def led(landed: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Domain]:
     """Return the domains after a reset: of modes that overlap there the first that it leads into.
 
     A mode that it names is preferred to sliding on a surface next to it. Where it leads into none of them,
     the mode before it goes on.
     """
-    found = list(behind)
+    found = list(landed)
     for lead in (*leads, Lead(before, {})):
         if lead.after and before not in lead.after:
             continue
@@ -124,18 +124,18 @@ def led(behind: Sequence[Domain], leads: Sequence[Lead], before: str) -> list[Do
             for d in found
             if d.own_mode == lead.mode and all(d.signs[s] == v for s, v in lead.where.items())
         ]
-        beside = kept if lead.mode != before else []
+        nearby = kept if lead.mode != before else []
         found = [
             d
             for d in found
             if d.own_mode == lead.mode
-            or not (d.signs in kept or any(_is_next_to(d.signs, signs) for signs in beside))
+            or not (d.signs in kept or any(_is_next_to(d.signs, signs) for signs in nearby))
         ]
     return found
 
 
 def across(
-    behind: Sequence[Domain], surface: str, modes: Set[str], domains: Sequence[Domain]
+    landed: Sequence[Domain], surface: str, modes: Set[str], domains: Sequence[Domain]
 ) -> list[Domain]:
     """Return the domains on the other side of a surface that an image lies on, in modes that hold on both.
 
@@ -143,10 +143,10 @@ def across(
     """
     turned = [
         (d.own_mode, {**d.signs, surface: -d.signs[surface]})
-        for d in behind
+        for d in landed
         if d.own_mode in modes and d.signs[surface]
     ]
-    return [d for d in domains if d not in behind and (d.own_mode, d.signs) in turned]
+    return [d for d in domains if d not in landed and (d.own_mode, d.signs) in turned]
 
 
 def _is_next_to(sliding: Mapping[str, int], signs: Mapping[str, int]) -> bool:

@@ -1,6 +1,6 @@
-"""What names a model, a signature or a study: the path of a file, or a name.
+"""Tells a path from a name, for models, signatures and studies.
 
-Reading a file takes far more to import.
+Apart from the modules that read files, since these import far more.
 """
 
 from __future__ import annotations

@@ -207,7 +207,7 @@ class _Tangencies:
 
         rates = [formulas.rate(height, field) for field in own]
         second = [formulas.rate(r, field) for r, field in zip(rates, own, strict=True)]
-        unknowns = [formulas.t, *formulas.y]
+        unknowns = list(formulas.moving)
         args = [unknowns, list(formulas.p)]
         equations = [height, *rates]
         return cls(

@@ -1,4 +1,4 @@
-"""Where the time of an orbit begins: anywhere by the excitation, and where a turn ends without one.
+"""The origin of time of an orbit: with an excitation any, without one the end of a cycle.
 
 Every shift of an autonomous orbit in time is one too. Its joints are kept with the end of the turn at
 time 0, so that the first of them is minus the duration of the turn (:mod:`contfric.bvp.equations`).

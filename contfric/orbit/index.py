@@ -179,11 +179,13 @@ def _pins(system: System, a: FloatArray, b: FloatArray) -> dict[int, _Pin]:
 def _signs(matrices: FloatArray) -> list[int | None]:
     """Return the signs of determinants; None where rounding decides."""
     size = np.linalg.norm(matrices, axis=2)
-    told = np.isfinite(matrices).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
-    scaled = np.where(told[:, None, None], matrices, np.eye(matrices.shape[1]))
-    signs, logarithms = np.linalg.slogdet(scaled / np.where(told[:, None], size, 1.0)[:, :, None])
-    told &= logarithms > np.log(_NO_SIGN)
-    return [int(sign) if known else None for sign, known in zip(signs, told, strict=True)]
+    decided = np.isfinite(matrices).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    scaled = np.where(decided[:, None, None], matrices, np.eye(matrices.shape[1]))
+    signs, logarithms = np.linalg.slogdet(
+        scaled / np.where(decided[:, None], size, 1.0)[:, :, None]
+    )
+    decided &= logarithms > np.log(_NO_SIGN)
+    return [int(sign) if known else None for sign, known in zip(signs, decided, strict=True)]
 
 
 def index_at_infinity(model: Model, vector: FloatArray) -> int | None:

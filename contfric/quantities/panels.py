@@ -44,7 +44,7 @@ _NO_TIME = 1e3 * float(np.finfo(float).eps)
 _NO_SIGN = 1e-12
 #: Distance from a jump at which its sides are evaluated, as a share of the segment: far above rounding, far
 #: below anything that changes.
-_BESIDE = 1e-12
+_NEARBY = 1e-12
 
 
 def gauss_rule(nodes: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -123,9 +123,9 @@ class Resolved:
         At the jump the argument a is zero; a fixed share moves it by da, time by its rate, so that the jump
         moves by -da / rate against that share.
         """
-        sides = self.value(np.array([cut.share - _BESIDE, cut.share + _BESIDE]))
+        sides = self.value(np.array([cut.share - _NEARBY, cut.share + _NEARBY]))
         jump = sides.values[0] - sides.values[1]
-        if abs(jump) <= 1e3 * _BESIDE * (1.0 + np.max(np.abs(sides.values))):
+        if abs(jump) <= 1e3 * _NEARBY * (1.0 + np.max(np.abs(sides.values))):
             return np.zeros(sides.slopes.shape[1] - 1)
         kinks = Kinks()
         self.function(self.segment, np.array([cut.share]), kinks)

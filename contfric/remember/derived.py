@@ -1,4 +1,4 @@
-"""What is derived from a model's declaration, on disk: domains are sought once, not in every process.
+"""A cache on disk of what is derived from a model's declaration, such as its domains.
 
 It lies next to the cached kernels, or came with the wheel: in a folder named by a digest of the whole
 package, in files named by one of what was derived from.

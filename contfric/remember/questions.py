@@ -1,9 +1,9 @@
-"""What a call is asked, as bytes that tell it from others: of a user's function its code counts.
+"""The arguments of a call as bytes that distinguish it from other calls; a user's function by its code.
 
-A function is no data that could be read again, but a result depends on what it does. So it is told by its
-compiled code and the values that it uses: constants, defaults, what it closes over, and what it names of its
-module: numbers, texts, arrays, and other functions, these in the same way. Of another module its name counts:
-a change there goes unseen.
+A function is no data that could be read again, but a result depends on what it does. So it is identified
+by its compiled code and the values that it uses: constants, defaults, what it closes over, and what it
+names of its module: numbers, texts, arrays, and other functions, these in the same way. Of another module
+its name counts: a change there goes unseen.
 """
 
 from __future__ import annotations

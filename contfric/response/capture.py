@@ -1,4 +1,4 @@
-"""Which of some orbits a solution converges to, compiled.
+"""Decides which of some orbits a solution converges to, compiled.
 
 A solution is followed from joint to joint. It has converged where a joint lies so near to one of an orbit
 that nothing but that orbit attracts it: same mode, same surface, same phase, and a state within the radius

@@ -1,4 +1,4 @@
-"""What the compiled sections take and fill: the section, how solutions are followed, points and ends."""
+"""Input and output of the compiled sections: the section, how to follow solutions, points and ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a solution came to while it was followed."""
+"""The outcomes of following a solution."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 Everything is derived from the transitions of the model: which modes slide, and where a surface
 leads from a domain. No edit returns an itinerary that the graph cannot walk.
 
-An :class:`Edit` is a local change of an itinerary: segments dropped, given another exit, or inserted behind
+An :class:`Edit` is a local change of an itinerary: segments dropped, given another exit, or inserted after
 one. Edits at several places are joined by ``|``. With it are made
 
 * **insert** and **drop**: a segment of length zero appears or vanishes,
@@ -84,9 +84,9 @@ def drop(*segments: int) -> Edit:
     return Edit(dropped=frozenset(segments))
 
 
-def insert(behind: int, *pairs: ReducedPair) -> Edit:
+def insert(segment: int, *pairs: ReducedPair) -> Edit:
     """Return the edit that puts segments after one."""
-    return Edit(inserted={behind: pairs})
+    return Edit(inserted={segment: pairs})
 
 
 def split(segment: int, exit_surface: str, *pairs: ReducedPair) -> Edit:
@@ -258,10 +258,10 @@ def _new_stick(itinerary: ReducedItinerary, joint: int, surface: str, model: Mod
     mode, stop = itinerary[joint]
     next_mode = itinerary[(joint + 1) % len(itinerary)][0]
     slides = [domain.name for domain in model.domains_of(mode)]
-    behind = {
+    after_stop = {
         model.domain_by_name[t].mode for d in slides for t in model.targets.get((d, stop), ())
     }
-    for stick in sorted((m for m in behind if model.lies_on(m, stop)), key=model.mode_order):
+    for stick in sorted((m for m in after_stop if model.lies_on(m, stop)), key=model.mode_order):
         held = entered(slides, stop, model, mode, stick)
         if entered(held, surface, model, stick, next_mode):
             return stick, surface

@@ -165,9 +165,9 @@ def _fused(signature: Signature) -> tuple[ReducedSegment, ...]:
     modes = [mode_of(model, names, i) for i in range(len(names))]
     count = len(names)
     after = rotated(tuple(modes), 1)
-    beside = [is_hold(names[i]) or is_hold(names[(i + 1) % count]) for i in range(count)]
+    nearby = [is_hold(names[i]) or is_hold(names[(i + 1) % count]) for i in range(count)]
     ends = [
-        i for i in range(count) if beside[i] or not fuses(model, modes[i], surfaces[i], after[i])
+        i for i in range(count) if nearby[i] or not fuses(model, modes[i], surfaces[i], after[i])
     ]
     if not ends:
         modes = [model.domain_by_name[name].own_mode for name in names]

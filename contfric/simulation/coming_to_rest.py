@@ -1,4 +1,4 @@
-"""Whether the next impacts come to rest (chatter): decided ahead, and only where that is possible.
+"""Decides ahead whether the next impacts come to rest (chatter), where that is possible.
 
 A mode of chatter begins with the first of infinitely many impacts, so after an impact the later ones are
 looked at, over many periods. Impacts that do not come to rest are thrown off, go on for ever, or meet another

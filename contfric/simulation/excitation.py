@@ -1,4 +1,4 @@
-"""What is refused before a solution is followed: an excitation with another period than the model's."""
+"""Refuses to simulate with an excitation whose period is not that of the model."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def signs_at(
         signs[surface.name] = (
             int(np.sign(apart)) if abs(apart) > within else 0
         )  # also where it is no number
-    return {**signs, **model.settled_sides}
+    return {**signs, **model.fixed_sides}
 
 
 def left_through(model: Model, mode: str, t: float, y: FloatArray, vector: FloatArray) -> str:
@@ -55,7 +55,7 @@ def left_through(model: Model, mode: str, t: float, y: FloatArray, vector: Float
     within = _OUTSIDE * (1.0 + float(np.max(np.abs(y))))
     own = model.domains_of(model.whole_mode(mode))
     for surface, side in signs_at(model, t, y, vector, within).items():
-        if surface in model.settled_sides:  # at rest on a wall it is on either side
+        if surface in model.fixed_sides:  # at rest on a wall it is on either side
             continue
         if side and {d.signs.get(surface, 0) for d in own} == {-side}:
             return surface
@@ -74,8 +74,8 @@ def start_of(
             f"{model.name} is no finite number: its parameters or the state are too large, or a formula "
             "has no value there. Choose others (params, state=...)"
         )
-    exact = {k: int(np.sign(h)) for k, h in start.heights.items()} | model.settled_sides
-    signs = exact | {k: 0 for k in exact if k not in model.settled_sides and start.lies_on(k)}
+    exact = {k: int(np.sign(h)) for k, h in start.heights.items()} | model.fixed_sides
+    signs = exact | {k: 0 for k in exact if k not in model.fixed_sides and start.lies_on(k)}
     given: object = domain  # whatever the user gave
     if given is not None and not (isinstance(given, str) and given in model.domain_by_name):
         raise ParameterError(
@@ -139,7 +139,7 @@ def _let_go(
 ) -> str:
     """Return the mode of a state on a wall that does not press it; nothing if it does."""
     for lift, flight in rest.ways:
-        if model.view(vector).height(lift, t, y) * model.settled_sides[lift] < 0.0:
+        if model.view(vector).height(lift, t, y) * model.fixed_sides[lift] < 0.0:
             side = model.domains_of(flight)[0].signs[rest.surface]
             domain = model.domain_at({**signs, rest.surface: side}, flight)
             return model.domain_by_name[domain].own_mode if domain else ""
@@ -167,10 +167,10 @@ def _side_of_rates(
         rate = flow.rate(domain.mode, surface.observable, t, y)
         return domain.signs[surface.name] * rate > 0.0
 
-    beside = [
+    nearby = [
         d for d in model.domains if all(sign in (0, d.signs[name]) for name, sign in signs.items())
     ]
-    return next((d.name for d in beside if all(enters(d, s) for s in model.surfaces)), None)
+    return next((d.name for d in nearby if all(enters(d, s) for s in model.surfaces)), None)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what comes of it is refused

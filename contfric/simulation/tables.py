@@ -218,7 +218,7 @@ def sides_of(model: Model, signs: Mapping[str, int], skipped: Collection[str]) -
     asked = [
         s
         for s, sign in signs.items()
-        if sign != 0 and s not in skipped and s not in model.settled_sides
+        if sign != 0 and s not in skipped and s not in model.fixed_sides
     ]
     return bits_of(model, asked), bits_of(model, (s for s in asked if signs[s] > 0))
 

@@ -1,4 +1,4 @@
-"""What a simulation asks at a wall: is a mass pressed to it, in flight, or at rest on it."""
+"""Tests at a wall: whether a mass is pressed to it, in flight, or at rest on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study will compute, step by step, and what it will not, and why."""
+"""The plan of a study: what it computes, step by step, and what it skips, and why."""
 
 from __future__ import annotations
 

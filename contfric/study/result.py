@@ -1,4 +1,4 @@
-"""What a run returns: what was found, how it ended, and where it is."""
+"""The result of a run: what was found, how it ended, and where its files are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a study may want of orbits: columns of its table of points, and rows of a diagram."""
+"""Quantities that a study may ask for: columns of its table of points, and rows of a diagram."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ PARTS = {
     "`integration`": schema.Integration,
     "a friction contact": schema.Friction,
     "a Jenkins element": schema.Jenkins,
-    "a spring behind a gap": schema.Spring,
+    "a spring across a gap": schema.Spring,
     "a wall": schema.Impact,
 }
 

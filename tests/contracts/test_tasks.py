@@ -46,7 +46,7 @@ class ShareTask(Task):
 
     def compute(self, job) -> Any:
         self.asked.append(str(self.options()))
-        job.told(self.name)("divides")
+        job.progress_of(self.name)("divides")
         one, other = (job.study.params[name] for name in self.of)
         return cf.poincare(job.study.model, job.study.params, periods=2), one / other
 

@@ -17,7 +17,7 @@ def test_code_runs() -> None:
     assert scope["found"].motion is cf.Motion.CHAOTIC
     assert scope["both"].coexisting.tolist() == [[False], [True]]
     assert scope["short"].chaotic.tolist() == [[True]]
-    assert scope["told"].chaotic.tolist() == [[False]]
+    assert scope["longer"].chaotic.tolist() == [[False]]
 
 
 def test_table_has_every_motion_in_its_order() -> None:

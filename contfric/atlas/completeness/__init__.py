@@ -1,1 +1,1 @@
-"""Whether a diagram is complete: restarts from its own branches, and balances of indices."""
+"""Checks that a diagram is complete: restarts from its own branches, and balances of indices."""

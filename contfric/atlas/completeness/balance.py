@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from contfric.atlas.diagram import Diagram, Node
 
 #: Points this near to an event (in accuracies of its place) are on no side of it.
-_BESIDE = 10.0
+_NEARBY = 10.0
 #: Arclength from an event, in sizes of the orbit, below which a multiplier may be 1 but for rounding.
 _BLURRED = 1e-4
 #: Values of the parameter between two neighbouring events at which indices are summed.
@@ -118,7 +118,7 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
         b = node.bifurcation
         if node.mirrored or b.kind in (Kind.T, Kind.NS) or not b.located:
             continue
-        value, slack = b.params[diagram.parameter], _BESIDE * b.accuracy * width
+        value, slack = b.params[diagram.parameter], _NEARBY * b.accuracy * width
         if not diagram.range[0] + slack < value < diagram.range[1] - slack:
             continue
         if b.orbit.model.autonomous:
@@ -139,13 +139,13 @@ def balances(diagram: Diagram) -> Iterator[Balance]:
             below, above = (_sum(families, side, period, times * period) for side in (-1, 1))
             rest = _ended(diagram, node, EndReason.REST)  # the mass stays at rest for ever
             if rest is not None and below is not None and above is not None:
-                beside = _REST_BESIDE * width
-                below += _rests(rest, diagram.parameter, value - beside)
-                above += _rests(rest, diagram.parameter, value + beside)
+                distance = _REST_BESIDE * width
+                below += _rests(rest, diagram.parameter, value - distance)
+                above += _rests(rest, diagram.parameter, value + distance)
             events = [diagram.nodes[joined].bifurcation for joined in nodes]
             if any(leads_elsewhere(e.orbit, test) for e in events for test in e.tests):
                 below = above = None
-            walls = [t for e in events for t in e.tests if t.surface in e.orbit.model.settled_sides]
+            walls = [t for e in events for t in e.tests if t.surface in e.orbit.model.fixed_sides]
             if walls or any(accumulates(e) for e in events):
                 below = above = None  # incomplete chatter: beyond it branches are infinitely many
             lost = any(_frees(e.orbit, test) for e in events for test in e.tests)
@@ -225,7 +225,7 @@ def _joined(diagram: Diagram, number: int) -> tuple[list[int], float]:
 
 def _slack(diagram: Diagram, nodes: list[int]) -> float:
     """Return how near to events orbits are on no side of them."""
-    return max(_BESIDE * diagram.nodes[k].bifurcation.accuracy * diagram.width for k in nodes)
+    return max(_NEARBY * diagram.nodes[k].bifurcation.accuracy * diagram.width for k in nodes)
 
 
 def _flat_parts(diagram: Diagram, i: int, value: float, slack: float) -> Iterator[tuple[int, int]]:
@@ -255,7 +255,7 @@ def _families(
             continue
         for position in _positions(diagram, node, branch):
             for way in (-1, 1):
-                found = _beside(branch, position, way, value, slack, diagram.width)
+                found = _nearby_orbit(branch, position, way, value, slack, diagram.width)
                 if found is not None:
                     yield found
 
@@ -277,7 +277,7 @@ def _position(branch: Branch, event: Bifurcation) -> float:
     return float(branch.arc[-1]) if branch.ends[1].bifurcation is event else event.position
 
 
-def _beside(
+def _nearby_orbit(
     branch: Branch, position: float, way: int, value: float, slack: float, width: float
 ) -> tuple[int, Orbit] | None:
     """Return an orbit of a branch on one side of an event, before the branch meets the next one."""

@@ -1,1 +1,1 @@
-"""What leaves an event: which orbits, on which side of it, and at how small a distance."""
+"""Branches that leave an event: which orbits, on which side of it, and how close to it they start."""

@@ -1,4 +1,4 @@
-"""What leaves a branch point or a period doubling along its null vector; the next one on another core."""
+"""Branches that leave a branch point or a period doubling along its null vector."""
 
 from __future__ import annotations
 

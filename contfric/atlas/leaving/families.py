@@ -68,7 +68,7 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
         if candidate.orbit is None or candidate.has_hold:
             continue
         for share in _BOTH:
-            near = _beside_family(state, candidate.orbit, share)
+            near = _next_in_family(state, candidate.orbit, share)
             if near is None or state.known(near) is not None:
                 continue
             branch = whole_branch(shortest(near), state.settings)
@@ -79,7 +79,7 @@ def follow_beside_family(state: Exploration, event: Event) -> None:
                 state.accept(event, candidate.reason, branch, ends)
 
 
-def _beside_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
+def _next_in_family(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
     """Return an admissible orbit of an itinerary next to the end of a family, on one side of its value.
 
     The two lines are two lengths of the segment that vanishes, in proportion to the distance: if the one that

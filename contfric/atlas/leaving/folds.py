@@ -14,7 +14,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.half_branch import first_point
 from contfric.continuation.points import Point
 from contfric.continuation.singular_points.arms import Arms, arms_at
-from contfric.continuation.singular_points.switching import NEARER, start_beside
+from contfric.continuation.singular_points.switching import NEARER, start_nearby
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import Decision, EndReason, Kind
 from contfric.events.incident.sequences import MOST_SEQUENCES, count, lengths, necklaces
@@ -34,7 +34,9 @@ def follow_arms(state: Exploration, event: Event) -> bool:
     longest = lengths(unit.periods, unit.half, most)
     if arms.letters == 2 and longest == [1]:
         return True  # the two arms of the branch itself
-    near = [(d, found) for d in NEARER if (found := arms.beside(d, state.settings)) is not None]
+    near = [
+        (d, found) for d in NEARER if (found := arms.solved_near(d, state.settings)) is not None
+    ]
     for length in longest:
         many = count(arms.letters, length)
         if many > MOST_SEQUENCES or not near:
@@ -81,7 +83,7 @@ def _add_one_sided(
 ) -> None:
     """Trace a family away from its orbit at a fold, from a point next to it."""
     settings = settings_for(orbit, state.settings)
-    point, origin = start_beside(orbit, point, settings, point.joints - orbit.joints)
+    point, origin = start_nearby(orbit, point, settings, point.joints - orbit.joints)
     side = trace_side(orbit, point, settings, progress=state.progress)
     first = first_end(EndReason.BP, event, side, settings)
     state.accept(event, reason, assemble(orbit, settings, side, first, origin))

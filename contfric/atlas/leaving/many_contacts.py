@@ -48,7 +48,7 @@ def goes_on(state: Exploration, event: Event) -> bool:
     for number in event.branches:
         branch = state.branches[number]
         for first in _ends_at(branch, event, state.settings.width):
-            index, side = _beside(branch, first, state.settings.parameter)
+            index, side = _next_to_end(branch, first, state.settings.parameter)
             if index is None:
                 return False
             sums[side] += index
@@ -67,7 +67,7 @@ def _ends_at(branch: Branch, event: Event, width: float) -> Iterator[int]:
             yield point
 
 
-def _beside(branch: Branch, end: int, parameter: str) -> tuple[int | None, int]:
+def _next_to_end(branch: Branch, end: int, parameter: str) -> tuple[int | None, int]:
     """Return the index of the orbits of a branch next to one of its ends, and the side that they are on."""
     values, multipliers = branch.params[parameter], branch.multipliers
     near = 1 if end == 0 else -2

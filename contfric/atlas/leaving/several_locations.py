@@ -1,4 +1,4 @@
-"""How an orbit leaves an event at which several locations of it are singular at once: by leading orders.
+"""Orbits that leave an event at which several locations are singular at once, by leading orders.
 
 Where a slide of no length comes in, its ends may move together, and no equation changes to first order. Such
 a freedom v is a null vector of the Jacobian F_z of all equations. What it does is of order p, two at a touch

@@ -64,7 +64,7 @@ class _Parabola:
     phi: FloatArray
     bend: FloatArray
     rise: float
-    beside: Point
+    nearby: Point
     settings: Settings
 
     def at(self, distance: float) -> Orbit:
@@ -77,7 +77,7 @@ class _Parabola:
         """Return the same as a point; multipliers are those next to it."""
         here = self.at(distance)
         return replace(
-            self.beside,
+            self.nearby,
             joints=here.joints,
             w=np.array([settings_value(here, self.settings)]),
             tangent=self.phi,
@@ -114,12 +114,12 @@ def _parabola(orbit: Orbit, phi: FloatArray, settings: Settings) -> _Parabola | 
             return None
         bend = (point.joints - moved.joints) / distance**2
         found.append((bend, (point.value - value) / distance**2, point))
-    (bend, rise, beside), (nearer, other, _) = found
+    (bend, rise, nearby), (nearer, other, _) = found
     misses = np.abs(bend - nearer).max(), abs(rise - other) / settings.width
     size = np.abs(bend).max() + abs(rise) / settings.width
     if max(misses) > _MISSED * size:
         return None
-    return _Parabola(orbit, phi, bend, rise, beside, settings)
+    return _Parabola(orbit, phi, bend, rise, nearby, settings)
 
 
 def is_short(branch: Branch) -> bool:

@@ -1,4 +1,4 @@
-"""What follows where the touch that pins a hold splits: the same itinerary, pinned to the earlier touch.
+"""Continues a bridge where the touch that pins its hold splits: pinned to the earlier touch.
 
 See :mod:`contfric.events.split_touch`. The equations are singular there in the time of the pin, so that
 the orbits of the other side are looked for next to the event.
@@ -28,10 +28,10 @@ def follow_split(state: Exploration, event: Event) -> bool:
     if event.bifurcation.kind is not Kind.AS or not splits(orbit):
         return False
     for share in _SHARES:
-        beside = _beside(state, orbit, share)
-        if beside is None or state.known(beside) is not None:
+        nearby = _nearby_orbit(state, orbit, share)
+        if nearby is None or state.known(nearby) is not None:
             continue
-        branch = whole_branch(beside, state.settings)
+        branch = whole_branch(nearby, state.settings)
         if branch is None or not any(ends_at(e, event, state.settings) for e in branch.ends):
             continue
         state.accept(event, _REASON, branch)
@@ -40,7 +40,7 @@ def follow_split(state: Exploration, event: Event) -> bool:
     return False
 
 
-def _beside(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
+def _nearby_orbit(state: Exploration, orbit: Orbit, share: float) -> Orbit | None:
     """Return the orbit of the same itinerary at a parameter next to the event, pinned to the first touch."""
     guess = next_to(orbit, state.settings, share)
     if guess is None:

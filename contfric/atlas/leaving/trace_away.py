@@ -18,7 +18,7 @@ from contfric.continuation.assembly import assemble
 from contfric.continuation.branch import Branch
 from contfric.continuation.half_branch import Side, first_point
 from contfric.continuation.points import Point, Settings, displaced
-from contfric.continuation.singular_points.switching import LEAVE, NEARER, start_beside
+from contfric.continuation.singular_points.switching import LEAVE, NEARER, start_nearby
 from contfric.continuation.trace import trace_side
 from contfric.events.bifurcation import ACCURACY, TERMINAL, Bifurcation, End, EndReason
 from contfric.events.incident.candidates import Candidate, directions
@@ -36,7 +36,7 @@ _ENDS = 2
 #: Cosines that miss 1 by less are those of one tangent: of an angle of 1e-4, which the corrector closes.
 _ONE_WAY = 1e-8
 #: Sine of the angle by which a curve may miss the direction it is looked for in.
-_BESIDE = 0.5**0.5
+_NEARBY = 0.5**0.5
 #: A branch that gets no farther than this (arclength) from the event it starts at has left it in the
 #: direction in which it is not admissible.
 _NOWHERE = 1e-7
@@ -59,7 +59,7 @@ def leave_event(state: Exploration, candidate: Candidate, event: Event) -> Branc
     settings = settings_for(orbit, state.settings)
     if candidate.away is not None:
         way = _straight(candidate.away)
-        branch = _leave_beside(state, orbit, way, event, settings, candidate.share)
+        branch = _leave_nearby(state, orbit, way, event, settings, candidate.share)
         return branch or leave_singular(state, orbit, event, settings)
     longest: tuple[Orbit, Side] | None = None
     for first_step in _NEAR_EVENT:
@@ -149,7 +149,7 @@ def _straight(away: FloatArray) -> Callable[[float], FloatArray]:
     return lambda distance: distance * away
 
 
-def _leave_beside(
+def _leave_nearby(
     state: Exploration,
     orbit: Orbit,
     way: Callable[[float], FloatArray],
@@ -171,9 +171,9 @@ def _leave_beside(
             if point is None:
                 continue
             there = point.orbit(orbit, active)
-            if not (_is_beside(there, moved, orbit) and there.admissible):
+            if not (_is_nearby(there, moved, orbit) and there.admissible):
                 continue
-            point, origin = start_beside(orbit, point, settings, away)
+            point, origin = start_nearby(orbit, point, settings, away)
             side = _trace(there, point, settings, _NEAR_EVENT[0], state.progress)
             if side.count > 1:
                 _end_where_it_began(side, origin, event, settings)
@@ -182,14 +182,14 @@ def _leave_beside(
     return None
 
 
-def _is_beside(there: Orbit, moved: Orbit, orbit: Orbit) -> bool:
+def _is_nearby(there: Orbit, moved: Orbit, orbit: Orbit) -> bool:
     """Tell whether what was solved for from a short distance off an orbit is next to it.
 
     A curve through the orbit within 45 degrees of the direction passes the guess at less than this. What
     Newton's method finds farther away lies on another curve, or is the orbit itself.
     """
     missed = np.linalg.norm(there.joints - moved.joints)
-    return bool(missed <= _BESIDE * np.linalg.norm(moved.joints - orbit.joints))
+    return bool(missed <= _NEARBY * np.linalg.norm(moved.joints - orbit.joints))
 
 
 def _distances(orbit: Orbit, event: Event) -> list[float]:
@@ -216,7 +216,7 @@ def leave_singular(
         return branch
     active = orbit.model.index_of(settings.parameter)
     for away, slope in ways_in_plane(orbit, active):
-        branch = _leave_beside(state, orbit, _straight(away), event, settings, slope)
+        branch = _leave_nearby(state, orbit, _straight(away), event, settings, slope)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None
@@ -227,7 +227,7 @@ def _leave_together(
 ) -> Branch | None:
     """Trace away from an event at which several locations of an orbit open at once."""
     for away in opening_together(orbit, orbit.model.index_of(settings.parameter)):
-        branch = _leave_beside(state, orbit, away.at, event, settings)
+        branch = _leave_nearby(state, orbit, away.at, event, settings)
         if branch is not None and branch.arc[-1] > _SURELY_AWAY:
             return branch
     return None

@@ -1,1 +1,1 @@
-"""Where an exploration starts: attractors of simulations, and orbits inside one mode."""
+"""Starting points of an exploration: attractors of simulations, and orbits inside one mode."""

@@ -1,1 +1,1 @@
-"""How well an event is known: its parameter value, and the signs that are read near it."""
+"""Accuracy of events: errors of their parameters, and of the signs of test functions near them."""

@@ -1,4 +1,4 @@
-"""How far errors of all equations of a chain move what they fix: an event's parameter, a duration."""
+"""How far errors of a chain's equations move an event's parameter or a duration."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ _WITHIN = 0.9
 _MISS = 0.3
 
 
-def last_told(step: Step) -> Point | None:
+def last_reliable(step: Step) -> Point | None:
     """Return the last point of a step at which the signs of slopes and multipliers are told, or None.
 
     Where an exit becomes tangential a multiplier grows like the inverse of its rate: at the located event it
@@ -54,7 +54,7 @@ def last_told(step: Step) -> Point | None:
     beyond = step.beyond
     here = step.orbit_at(beyond)
     if beyond is not step.after and bool(here.durations.min() < NO_LENGTH):
-        told = _told_before(step)
+        told = _reliable_before(step)
         if told is not None:
             return told
     if not np.isfinite(beyond.tests[-EXTRA:]).all():
@@ -64,7 +64,7 @@ def last_told(step: Step) -> Point | None:
     return _if_finite(point_before(here, beyond, SAME_LOCATION, step.settings))
 
 
-def first_told(step: Step) -> Point:
+def first_reliable(step: Step) -> Point:
     """Return the first point of a step at which the signs of multipliers are told.
 
     At a sliding event from which a side starts a multiplier may be infinite, and its sign that of rounding.
@@ -85,7 +85,7 @@ def _if_finite(point: Point | None) -> Point | None:
     return point if point is not None and np.isfinite(point.tests[-EXTRA:]).all() else None
 
 
-def _told_before(step: Step) -> Point | None:
+def _reliable_before(step: Step) -> Point | None:
     """Return the point before a sliding event from which on all belongs to it; None where that is not told.
 
     So it is where the parameter goes on through the event, as it does where no two curves cross.

@@ -1,4 +1,4 @@
-"""How well the parameter of a located event is known: what rounding does to the equations of the event.
+"""Error bound of a located event's parameter, from the rounding errors of its equations.
 
 The equations of the orbit and that of the event fix the joints and the parameter together. Errors in these
 equations move the parameter by the last row of the inverse of their Jacobian. An error is what is left of
@@ -41,7 +41,7 @@ from contfric.orbit.solve import refine
 LEAST = 1e-11
 #: Neighbours at which a multiplier is evaluated: distance in the parameter, as a share of 1 + its value and
 #: of the range. Far above rounding, and multipliers are parabolas there.
-_BESIDE, _BESIDE_RANGE = 1e-6, 1e-4
+_NEARBY, _BESIDE_RANGE = 1e-6, 1e-4
 _NEIGHBOURS = (-2.0, -1.0, 1.0, 2.0)
 #: Shares of that distance: the shorter ones where a fold or a touch of a kink lies between.
 _CLOSER = (1.0, 1e-2, 1e-4)
@@ -190,14 +190,14 @@ def _gap_gradient(
         return gradient, slope + moves
     k -= len(times) * len(own)
     for at, lies_on in ((i, row[2]), (i + 1, row[3])):
-        beside = [name for name in own if model.surface_index[name] != lies_on]
-        if k < len(beside):
+        others_met = [name for name in own if model.surface_index[name] != lies_on]
+        if k < len(others_met):
             joint = whole.begins[i] if at == i else whole.ends[i]
-            gradient[at], slope = surface_gradient(whole, beside[k], joint, active)
+            gradient[at], slope = surface_gradient(whole, others_met[k], joint, active)
             if at == i:
                 gradient[at], slope = before_reset(whole, i, gradient[at], slope, active)
             break
-        k -= len(beside)
+        k -= len(others_met)
     return gradient, slope
 
 
@@ -231,7 +231,7 @@ def _multiplier_error(kind: Kind, here: Orbit, active: int, width: float) -> flo
     """Return the error of the parameter at which a multiplier is on the unit circle."""
     value = float(here.vector[active])
     size = here.model.size_of(active, value)
-    distance = min(_BESIDE * size, _BESIDE_RANGE * width)
+    distance = min(_NEARBY * size, _BESIDE_RANGE * width)
     own = UNITS * float(np.finfo(float).eps) * size
     least: float | None = None
     for share in _CLOSER:

@@ -1,1 +1,1 @@
-"""Where a branch ends: at an event, the range, a vertex, or a value that a quantity takes."""
+"""Ends of a branch: at an event, the range, a vertex, or a value that a quantity takes."""

@@ -246,7 +246,7 @@ def _why_it_ends(bifurcation: Bifurcation) -> str:
         return "grazing impact: the wall is just touched"
     if any(entered_at(orbit.system, t) or thrown_at(orbit, t) for t in bifurcation.tests):
         return bifurcation.meaning
-    if {test.surface for test in bifurcation.tests} & orbit.model.settled_sides.keys():
+    if {test.surface for test in bifurcation.tests} & orbit.model.fixed_sides.keys():
         return (
             "incomplete chatter: beyond this point impacts are finitely many, and branches with any number "
             "of them come together here"

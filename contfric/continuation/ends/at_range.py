@@ -1,4 +1,4 @@
-"""Where a branch leaves the range: at a physical limit of the parameter, or where the user wants no more."""
+"""Ends of a branch at the range: at a physical limit of the parameter, or where the user's range ends."""
 
 from __future__ import annotations
 

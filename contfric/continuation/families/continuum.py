@@ -40,7 +40,7 @@ _RUN = 4
 _CHANGES = 1e-5
 #: Distance to the neighbour in a continuum (root mean square of joints): far from rounding, and near enough
 #: for Newton's method.
-_BESIDE = 1e-3
+_NEARBY = 1e-3
 #: Steps of Gauss and Newton to it, and what is left of the equations then.
 _STEPS, _SOLVED = 12, 1e-11
 #: Null vectors of the equations with the parameter, in a continuum.
@@ -65,7 +65,7 @@ def in_continuum(orbit: Orbit, active: int) -> bool:
     away = slopes[1] * vectors[0] - slopes[0] * vectors[1]
     if not np.any(away):
         away = vectors[0]
-    joints = orbit.joints + _BESIDE * away * np.sqrt(len(away)) / np.linalg.norm(away)
+    joints = orbit.joints + _NEARBY * away * np.sqrt(len(away)) / np.linalg.norm(away)
     for _ in range(_STEPS):
         residual, by_joints, _ = equations_at(orbit.system, joints, orbit.vector)
         if not np.isfinite(by_joints).all():
@@ -77,7 +77,7 @@ def in_continuum(orbit: Orbit, active: int) -> bool:
         return False
     gap = np.linalg.norm(joints - orbit.joints) / np.sqrt(len(joints))
     there, _ = null_space(orbit.system, joints, orbit.vector, active)
-    return bool(gap > 0.5 * _BESIDE and len(there) == _PLANE)
+    return bool(gap > 0.5 * _NEARBY and len(there) == _PLANE)
 
 
 def is_continuum(branch: Branch) -> bool:

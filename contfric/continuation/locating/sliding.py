@@ -27,7 +27,7 @@ _TOGETHER = 1e-9
 #: A margin that has more than this share of its change over a step left, where another one vanishes, vanishes
 #: well behind it. Nearer ones are located: where orbits shrink to a point, Newton's method may find another
 #: curve there (the parameter was off by 5e-6, with 2 % of the other margin's change left).
-_BEHIND = 0.1
+_WELL_AFTER = 0.1
 #: Newton may fail right after an event (a slide that vanishes, several conditions at once): it is reached
 #: where the margin is this small.
 _REACHED = 1e-8
@@ -156,7 +156,7 @@ def _is_behind(
     first, k = (orbit.system.tests[i] for i in pair)
     left, change = float(point.tests[pair[1]]), float(before.tests[pair[1]] - after.tests[pair[1]])
     just_there = first.margin is k.margin and -_NEGATIVE < left < _TOGETHER * change
-    return not point.lost and (left == np.inf or left > _BEHIND * change or just_there)
+    return not point.lost and (left == np.inf or left > _WELL_AFTER * change or just_there)
 
 
 def _pulled_in(

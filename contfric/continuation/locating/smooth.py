@@ -15,8 +15,8 @@ from contfric.continuation.accuracy.near_sliding_events import (
     SAME_LOCATION,
     SAME_VALUE,
     at_event,
-    first_told,
-    last_told,
+    first_reliable,
+    last_reliable,
     point_at,
 )
 from contfric.continuation.families.continuum import LEVEL
@@ -69,8 +69,8 @@ def smooth_events(step: Step) -> list[Located]:
     size = min(1.0, orbit.model.size_of(step.active, before.value))
     # events after a sliding one do not happen
     slides = step.beyond is not step.after
-    step = altered(step, after=last_told(step) or step.after)
-    told = first_told(step)
+    step = altered(step, after=last_reliable(step) or step.after)
+    told = first_reliable(step)
     starts = [before.tests[base + FOLD], *told.tests[base + CHI_ONE :].tolist()]
     values = [*zip(starts, step.after.tests[base:].tolist(), strict=True)]
     found: list[Located] = []

@@ -1,1 +1,1 @@
-"""Where the equations of an orbit are singular: folds, branch points, doublings, and what leaves them."""
+"""Folds, branch points and period doublings: where the equations of an orbit are singular."""

@@ -95,7 +95,7 @@ class Arms:
         """How many orbits of one unit there are: each turning hold is on either arm, or all on the same."""
         return int(2 ** len(self.turning))
 
-    def beside(self, distance: float, settings: Settings) -> Arms | None:
+    def solved_near(self, distance: float, settings: Settings) -> Arms | None:
         """Return the same with both arms solved near the fold, this far in the lengths of holds."""
         fold = self.fold
         direction = np.sum(list(self.turning.values()), axis=0)

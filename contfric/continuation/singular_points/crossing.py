@@ -1,4 +1,4 @@
-"""Branch points: orbits at which two curves of orbits cross, with or without a declared symmetry.
+"""Branch points at which two curves of orbits cross, with or without a declared symmetry.
 
 The equations of the chain of segments are ``F(z, p) = 0``, N equations for N + 1 unknowns. Along a curve of
 orbits the Jacobian ``J = [F_z, F_p]`` has rank N, at a fold as well as elsewhere; where two curves cross its
@@ -52,7 +52,7 @@ _CROSSES = 1e-8
 #: Directions are good to the square of the step of differences, about 1e-10.
 _TURNS = 1e-6
 #: Share of a step by which a branch point may lie outside of it: a change of sign at its very end.
-_BESIDE = 1e-3
+_NEARBY = 1e-3
 #: The same, where the step is short, in cube roots of rounding r and sizes of the orbit. At a distance x from
 #: where a curve turns an error r moves the parameter by r/x and the slope, of order x, by r/x^2.
 _BLURRED = 5.0
@@ -250,7 +250,7 @@ def crossing_between(step: Step, share: float) -> tuple[Crossing, Point] | None:
     chord = after.joints - before.joints, after.value - before.value
     square = _product(chord, chord, settings.scale)
     length = float(np.sqrt(square))
-    blurred = _BESIDE * length + _blur(near, step.orbit.model.rounding)
+    blurred = _NEARBY * length + _blur(near, step.orbit.model.rounding)
     crossing = crossing_near(step.orbit_at(near), settings, 2.0 * (length + blurred))
     if crossing is None:
         return None

@@ -1,4 +1,4 @@
-"""What a change of sign of a slope is: a fold, a vertex, a crossing of curves, a split touch, or nothing."""
+"""Classifies a change of sign of the slope: fold, vertex, crossing of curves, split touch, or nothing."""
 
 from __future__ import annotations
 

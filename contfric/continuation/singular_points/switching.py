@@ -1,4 +1,4 @@
-"""What leaves a branch point or a period doubling.
+"""Orbits that leave a branch point or a period doubling.
 
 Where two curves of orbits of one problem cross, :mod:`contfric.continuation.singular_points.crossing` has
 their directions. At a branch point of a symmetric orbit the problem on the *whole* cycle, at fixed
@@ -84,7 +84,7 @@ def leave_along(
     return BranchStart(point, origin)
 
 
-def start_beside(orbit: Orbit, point: Point, settings: Settings, along: FloatArray) -> BranchStart:
+def start_nearby(orbit: Orbit, point: Point, settings: Settings, along: FloatArray) -> BranchStart:
     """Return a point next to a singular orbit as the start of a branch that leaves the orbit.
 
     Parameters

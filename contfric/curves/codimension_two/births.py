@@ -1,4 +1,4 @@
-"""Where curves of asymmetric (doubled) orbits begin and end: the orbits become symmetric (undoubled).
+"""Points at which a curve of asymmetric (or doubled) orbits begins: they become symmetric (undoubled).
 
 A fold curve does so at a degenerate branch point or doubling. A curve of CS, SS, AS or GS does where the
 curve of that event of symmetric (undoubled) orbits meets BP (PD): the event happens at a second place, the

@@ -1,4 +1,4 @@
-"""Where SN, BP or PD meets a tangential exit: both conditions are solved at once.
+"""Points at which SN, BP or PD meets a tangential exit: both conditions are solved at once.
 
 The rate of such an exit vanishes. Where a stick follows, nothing that comes later depends on when it is
 reached, and the multipliers have a limit (:mod:`contfric.bvp.saltation`). But the chain's Jacobian has the

@@ -1,4 +1,4 @@
-"""What a change of sign on a curve is: which test it was, where it vanishes, and its name."""
+"""Identifies a change of sign on a curve: which test it was, where it vanishes, and its name."""
 
 from __future__ import annotations
 

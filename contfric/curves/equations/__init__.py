@@ -1,1 +1,1 @@
-"""What vanishes along a curve, compiled: conditions, bordered functions and their exact gradients."""
+"""Conditions that vanish along a curve, compiled: bordered functions and their exact gradients."""

@@ -153,7 +153,7 @@ def start_condition(way, i, c, target, z):  # type: ignore[no-untyped-def]
     """Return an observable less a level where segment i begins, and add the gradient to the border row."""
     functions, layout, p, which = way.functions, way.layout, way.p, way.which
     workspace, equations = way.workspace, way.workspace.equations
-    grad, behind = equations.grad, equations.behind
+    grad, after_reset = equations.grad, equations.after_reset
     n = z.shape[1] - 1
     if layout.resets[i] < 0:
         value = functions.observe(c, z[i, 0], z[i, 1:], p, which, grad) - target
@@ -161,13 +161,13 @@ def start_condition(way, i, c, target, z):  # type: ignore[no-untyped-def]
             workspace.d[1, i, j] += grad[j]
     else:
         apply_reset(functions, layout, i, z[i], p, which, equations)
-        value = functions.observe(c, z[i, 0], behind[n, :n], p, which, grad) - target
+        value = functions.observe(c, z[i, 0], after_reset[n, :n], p, which, grad) - target
         workspace.d[1, i, 0] += grad[0]
         for a in range(n):
             for j in range(1 + n):
-                workspace.d[1, i, j] += grad[1 + a] * behind[a, j]
+                workspace.d[1, i, j] += grad[1 + a] * after_reset[a, j]
             for k in range(which.shape[0]):
-                workspace.e[1, k] += grad[1 + a] * behind[a, 1 + n + k]
+                workspace.e[1, k] += grad[1 + a] * after_reset[a, 1 + n + k]
     for k in range(which.shape[0]):
         workspace.e[1, k] += grad[1 + n + k]
     return value

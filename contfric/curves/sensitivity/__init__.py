@@ -1,1 +1,1 @@
-"""How an event moves with the parameters, and where it is at others."""
+"""How an event moves with the parameters, and its position at other parameters."""

@@ -1,4 +1,4 @@
-r"""How the location of an event moves with parameters: the direction of its curve in each plane.
+r"""Gradient of an event's parameter with respect to the others: the slope of its curve in each plane.
 
 The equations of the orbit, F(z, a, p) = 0, and the condition of the event, g(z, a, p) = 0, fix joints z
 and the parameter a for every value of another parameter p. In the plane of a and p the event has a curve,

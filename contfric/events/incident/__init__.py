@@ -1,1 +1,1 @@
-"""Which orbits an event joins: the outcomes at all its locations together, over one or several periods."""
+"""Orbits that an event joins: outcomes at all its locations together, over one or several periods."""

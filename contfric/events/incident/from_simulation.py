@@ -1,4 +1,4 @@
-"""What follows an event as the flow itself says: the itineraries of solutions near it.
+"""Finds what follows an event by simulation: the itineraries of solutions near it.
 
 Where the flow is continuous at an event (static and kinetic limit agree, a grazing impact, two surfaces
 met at once), solutions near the orbit at the event have its itinerary or that of the orbit that takes over.
@@ -34,7 +34,7 @@ from contfric.simulation.starts import signs_at
 #: Distances of the motions from the orbit at the event (nondimensional), the nearest first: where a turn
 #: amplifies much only those are guesses that Newton's method takes, where little the others change the
 #: itinerary.
-_BESIDE = (1e-7, 1e-5, 1e-3)
+_NEARBY = (1e-7, 1e-5, 1e-3)
 #: A turn may last this much longer than that at the event: a grazing changes it by the root of a distance.
 _LONGER = 1.2
 #: Where in a segment solutions may start: odd shares, no two of them symmetric to its middle.
@@ -107,7 +107,7 @@ def _starts_near(
     """Yield the distance, the parameters and the state of motions near an orbit, the nearest first."""
     start = orbit.state(time)
     data = orbit.system.layout.conserved  # which are given: solutions near the orbit have the same
-    for size in _BESIDE:
+    for size in _NEARBY:
         for k in range(len(start)):
             apart = np.zeros(len(start))
             apart[k] = size * (1.0 + abs(start[k]))

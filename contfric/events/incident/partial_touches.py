@@ -131,8 +131,8 @@ def _passages(whole: Orbit) -> list[int]:
     lasts, n, model = whole.durations, len(whole.itinerary), whole.model
     found = []
     for k, (_, surface) in enumerate(whole.itinerary):
-        before, behind = whole.itinerary[k - 1], whole.itinerary[(k + 1) % n]
-        same = model.whole_mode(before[0]) == model.whole_mode(behind[0])
+        before, following = whole.itinerary[k - 1], whole.itinerary[(k + 1) % n]
+        same = model.whole_mode(before[0]) == model.whole_mode(following[0])
         short = lasts[k] < SHORT * time_unit(whole)
         touch = EventFunction(Margin.EXIT, k, surface)
         if same and short and before[1] == surface and crossed_at(whole, touch):

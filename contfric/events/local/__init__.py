@@ -1,1 +1,1 @@
-"""What a solution does where an event happens: it touches, rests, or leaves rest with an acceleration."""
+"""The local behaviour of a solution at an event: it touches, rests, or leaves rest with an acceleration."""

@@ -1,4 +1,4 @@
-"""Whether rest can be held at an event: where it would be left with an acceleration, inside its region."""
+"""Checks that rest can be held at an event: released it would accelerate, and it is inside its region."""
 
 from __future__ import annotations
 

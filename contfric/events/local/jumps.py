@@ -1,4 +1,4 @@
-"""Whether rest is left with an acceleration: else nothing jumps, as in a system of Filippov.
+"""Tests whether rest is left with an acceleration; if not, nothing jumps (Filippov's case).
 
 Some models have no such acceleration (:attr:`contfric.models.definition.Model.filippov`). Others have none
 at some of their parameters: where the static limit equals the kinetic one (S0 = S) there is no load at which

@@ -304,10 +304,10 @@ def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Dom
         )
 
     before = next((d for d in model.domains_of(model.whole_mode(mode)) if holds(d, False)), None)
-    behind = () if before is None else model.targets.get((before.name, surface), ())
-    if not behind:
+    following = () if before is None else model.targets.get((before.name, surface), ())
+    if not following:
         return None
-    found = model.domain_by_name[behind[0]]
+    found = model.domain_by_name[following[0]]
     for name in sorted(met):
         onwards = model.transitions.get((found.name, name))
         if onwards is not None and found.signs[name] * rate(found, name) < 0.0:
@@ -317,7 +317,7 @@ def coming_back(orbit: Orbit, mode: str, surface: str, touch: FloatArray) -> Dom
 
 
 def crossed_at(orbit: Orbit, test: EventFunction) -> bool:
-    """Tell whether what touches a surface is crossed beyond the event: another mode lies behind, and no rest.
+    """Tell whether a surface that is touched is crossed beyond the event: into another mode, not into rest.
 
     So it is at a preloaded stop, or a switch of the force.
     """
@@ -353,8 +353,8 @@ def speeds_of_crossing(orbit: Orbit, k: int) -> tuple[float, float]:
     """
     (mode, surface), (beyond, _) = orbit.itinerary[k - 1], orbit.itinerary[k]
     time, state = float(orbit.begins[k, 0]), orbit.begins[k, 1:]
-    before, behind = (second_rate(orbit, m, surface, time, state) for m in (mode, beyond))
-    return -1.0, 2.0 * before / behind - 1.0
+    before, following = (second_rate(orbit, m, surface, time, state) for m in (mode, beyond))
+    return -1.0, 2.0 * before / following - 1.0
 
 
 def second_rate(orbit: Orbit, mode: str, surface: str, t: float, y: FloatArray) -> float:

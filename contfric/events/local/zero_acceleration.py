@@ -1,4 +1,4 @@
-"""Where a solution at rest could just not be left any more, and where a segment touches a surface.
+"""Times at which a resting solution is about to leave rest, or a segment touches a surface.
 
 Both are locations on one known segment, looked for once an event.
 """
@@ -165,9 +165,9 @@ def only_comes_back(orbit: Orbit, i: int, surface: str) -> bool:
         for joint in (orbit.begins[i], orbit.ends[i])
     )
     heights = [sign * (value - level) for value in (begin, *inside, end)]
-    beside = zip(heights[:-2], heights[2:], strict=True)
+    nearby = zip(heights[:-2], heights[2:], strict=True)
     return bool(inside) and all(
-        height > max(pair) for height, pair in zip(heights[1:-1], beside, strict=True)
+        height > max(pair) for height, pair in zip(heights[1:-1], nearby, strict=True)
     )
 
 
@@ -210,11 +210,11 @@ def touches_again(orbit: Orbit, i: int, surface: str, start: float) -> bool:
     for k in range(len(orbit.vector)):
         vector = orbit.vector.copy()
         vector[k] += _ASIDE * (1.0 + abs(vector[k]))
-        beside = heights(vector)
-        if len(beside) < 2:
+        nearby = heights(vector)
+        if len(nearby) < 2:
             continue
-        times = np.array([t for t, _ in beside])
-        first, other = (beside[int(np.argmin(np.abs(times - t)))][1] for t in (start, later[0]))
+        times = np.array([t for t, _ in nearby])
+        first, other = (nearby[int(np.argmin(np.abs(times - t)))][1] for t in (start, later[0]))
         if abs(first - other) > near:
             return False
     return True

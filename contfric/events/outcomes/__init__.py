@@ -1,1 +1,1 @@
-"""What can follow an event at one of its locations."""
+"""The possible outcomes of an event at one of its locations."""

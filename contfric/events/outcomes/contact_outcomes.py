@@ -1,4 +1,4 @@
-"""What follows an event of a structure with many contacts, if the return map is continuous.
+"""Outcomes of events of structures with many contacts, if the return map is continuous.
 
 The states of the contacts compose, so that the itinerary after an event follows from that before it. Where
 rest is left without acceleration (:attr:`contfric.models.definition.Model.filippov`) the solution is
@@ -22,7 +22,7 @@ limit begins a slide at ``-w``, with an acceleration that is zero at ``w``: its 
 Of friction contacts that share their loads two change at once: ``first``, at whose surface segment i ends,
 and another one. Where that is
 
-* beyond the limit of its load *behind* the joint, it lets go with the first: its state there is the other one
+* beyond the limit of its load *after* the joint, it lets go with the first: its state there is the other one
   on the two sides of the event. In between it changes a little later, in a segment without length;
 * at a surface *before* the joint, it may change first. As loads jump where a contact stops, what follows is
   not the same two changes in the other order: the second contact may stop, or let go, at once.
@@ -192,11 +192,11 @@ def crossed(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, Speeds
     beyond = coming_back(orbit, mode, surface, touch)
     if beyond is None:
         raise NotationError(f"what passes {surface} in segment {i + 1} does not come back")
-    before, behind = (
+    before, following = (
         second_rate(orbit, m, surface, float(touch[0]), touch[1:]) for m in (mode, beyond.mode)
     )
     edit = split(i, surface, (beyond.mode, surface), (mode, exit_))
-    away = {(i, 0): -1.0, (i, 1): 2.0 * before / behind - 1.0}
+    away = {(i, 0): -1.0, (i, 1): 2.0 * before / following - 1.0}
     reason = f"{surface} is touched in segment {i + 1}: crossed, and met again"
     return edit, {(i, 0): touch, (i, 1): touch}, away, reason
 
@@ -217,13 +217,13 @@ def vanished(orbit: Orbit, i: int) -> tuple[Edit, Joints, Speeds, str]:
     """
     itinerary, n, model = orbit.itinerary, len(orbit.itinerary), orbit.model
     for k in (i, (i + 1) % n):
-        before, behind = (k - 1) % n, (k + 1) % n
-        modes = [itinerary[j][0] for j in (before, behind)]
+        before, following = (k - 1) % n, (k + 1) % n
+        modes = [itinerary[j][0] for j in (before, following)]
         if n < 3 or _lasts(orbit, k) or len(set(map(model.whole_mode, modes))) > 1:
             continue
-        edit, joints = Edit(frozenset({k, behind}), {before: itinerary[behind][1]}), {}
+        edit, joints = Edit(frozenset({k, following}), {before: itinerary[following][1]}), {}
         if modes[0] != modes[1]:  # what ends on a section has the name of that side
-            edit = Edit(frozenset({before, k, behind}), {}, {before: (itinerary[behind],)})
+            edit = Edit(frozenset({before, k, following}), {}, {before: (itinerary[following],)})
             joints = {(before, 0): orbit.cycle[before]}
         return edit, joints, {}, f"segment {k + 1} vanishes"
     raise NotationError(f"segment {i + 1} ends tangentially, and what follows has some length")

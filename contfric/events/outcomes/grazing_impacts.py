@@ -1,4 +1,4 @@
-"""What can follow where a surface with a reset is grazed: an impact of speed zero comes in, or goes.
+"""Outcomes where a surface with a reset is grazed: an impact of zero speed appears or disappears.
 
 Where the impact changes the mode (a rocking block changes its foot) two of them do, with no time between.
 """
@@ -38,14 +38,14 @@ def grazing_impact(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints,
         edit = split(i, location.surface, (mode, exit_))
         reason = f"impact at the touch of {location.surface} in segment {i + 1}"
         return edit, {(i, 0): touch_of(orbit, i, location.surface)}, reason
-    behind = (i + 1) % len(itinerary)
+    following = (i + 1) % len(itinerary)
     reason = f"no impact on {location.surface} after segment {i + 1}"
     if pair := crossed_at_graze(orbit, i):
         return *_renamed(orbit, i, pair), reason
     whole = orbit.model.whole_mode
-    if whole(itinerary[behind][0]) != whole(mode) or len(itinerary) < 2:
+    if whole(itinerary[following][0]) != whole(mode) or len(itinerary) < 2:
         raise NotationError(f"the impact after segment {i + 1} changes the mode: it must stay")
-    return *runs_on(orbit, i, behind), reason
+    return *runs_on(orbit, i, following), reason
 
 
 def impact_at_joint(orbit: Orbit, location: EventFunction) -> tuple[Edit, Joints, str]:

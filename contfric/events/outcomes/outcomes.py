@@ -1,4 +1,4 @@
-"""What can follow a sliding event at one location of an orbit: the edit of its itinerary, and why.
+"""Outcomes of a sliding event at one location of an orbit: the edit of its itinerary, and the reason.
 
 The solution at the event is known, so the local structure of each outcome can be derived from it
 (``docs/bridges.md``). It needs the itinerary, the transitions and the flow; nothing knows what moves.
@@ -257,9 +257,9 @@ def _held_through(
         away = {(k, at): _APPEARS[0], (k, at + 1): _APPEARS[1]}
         return Successor(Edit(frozenset(), renamed, inserted), joints, reason, away)
     _same_way(orbit, mode, exit_, rest.departs[-1])
-    behind = (k + 1) % len(itinerary)
+    following = (k + 1) % len(itinerary)
     # one that ended tangentially was held from there on: that hold begins earlier
-    gone = frozenset({behind}) if is_hold(itinerary[behind][1]) else frozenset[int]()
+    gone = frozenset({following}) if is_hold(itinerary[following][1]) else frozenset[int]()
     return Successor(Edit(gone, renamed, inserted), joints, reason)
 
 
@@ -317,7 +317,7 @@ def _released(model: Model, mode: str, surface: str) -> str:
 def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
     """Return what follows where a hold comes to an end of its freedom."""
     h, itinerary = location.segment, orbit.itinerary
-    hold, before, behind = long_holds.hold_in(orbit, h), h - 1, (h + 1) % len(itinerary)
+    hold, before, following = long_holds.hold_in(orbit, h), h - 1, (h + 1) % len(itinerary)
     at_touch = itinerary[h][1] == TOUCH
     no_length = NO_LENGTH_AT_TOUCH if at_touch and not hold.after_rest else NO_LENGTH
     if orbit.durations[h] < no_length * time_unit(orbit) and vanishes_with(orbit, location):
@@ -325,7 +325,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
             return Successor(*long_holds.shortened(orbit, hold))
         reason = f"hold {h + 1} vanishes"
         if at_touch and not hold.after_rest:  # the slide goes on
-            return Successor(*slides.runs_on(orbit, before % len(itinerary), h, behind), reason)
+            return Successor(*slides.runs_on(orbit, before % len(itinerary), h, following), reason)
         return Successor(drop(h), {}, reason)
     if location.surface != hold.leaves and of_another(
         orbit.model, itinerary[h][0], location.surface, hold.leaves
@@ -342,7 +342,7 @@ def _hold_ends(orbit: Orbit, location: EventFunction) -> Successor:
         return _never_left(orbit, h)
     if location.margin is Margin.INTERIOR:
         return _pin_moves(orbit, location, hold.after_rest)
-    gone = orbit.durations[behind] < NEARLY_NO_LENGTH * time_unit(orbit)
+    gone = orbit.durations[following] < NEARLY_NO_LENGTH * time_unit(orbit)
     # a second hold, and the slide between them
     if gone and hold.until is None and itinerary[(h + 2) % len(itinerary)][1] == TOUCH:
         return _never_left(orbit, h)

@@ -62,12 +62,12 @@ def left_out(orbit: Orbit, i: int) -> tuple[Edit, Joints, str]:
 
     What follows it, a rest inside the limit, begins at the stop before it.
     """
-    behind = (i + 1) % len(orbit.itinerary)
+    following = (i + 1) % len(orbit.itinerary)
     reason = f"slide {i + 1} goes nowhere: rest instead"
     stop = orbit.cycle[i].copy()
-    if not behind:  # the rest that follows begins the orbit
+    if not following:  # the rest that follows begins the orbit
         stop[0] -= orbit.period
-    return drop(i), {(behind, -1): stop}, reason
+    return drop(i), {(following, -1): stop}, reason
 
 
 def only_touches(orbit: Orbit, j: int) -> bool:
@@ -75,8 +75,8 @@ def only_touches(orbit: Orbit, j: int) -> bool:
     itinerary = orbit.itinerary
     j %= len(itinerary)
     lasts = orbit.durations[j]
-    before, behind = itinerary[j - 1][0], itinerary[(j + 1) % len(itinerary)][0]
-    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(behind)
+    before, following = itinerary[j - 1][0], itinerary[(j + 1) % len(itinerary)][0]
+    same = orbit.model.whole_mode(before) == orbit.model.whole_mode(following)
     short = bool(lasts < _TOUCHES * time_unit(orbit))
     pairs = (itinerary[j][0], before), (before, itinerary[j][0])
     return same and short and any(leaves_smoothly(orbit, *pair) for pair in pairs)
@@ -89,12 +89,12 @@ def touch_alone(orbit: Orbit, j: int) -> tuple[Edit, Joints, str]:
     return *runs_on(orbit, (j - 1) % count, j, (j + 1) % count), reason
 
 
-def runs_on(orbit: Orbit, i: int, *behind: int) -> tuple[Edit, Joints]:
-    """Return the edit, and its joints, that lets segment ``i`` go on to the end of the last one behind it."""
-    end = orbit.itinerary[behind[-1]]
+def runs_on(orbit: Orbit, i: int, *following: int) -> tuple[Edit, Joints]:
+    """Return the edit, and its joints, that lets segment ``i`` go on to the end of the last one after it."""
+    end = orbit.itinerary[following[-1]]
     if end in orbit.model.sections:  # its mode says from which side it is crossed
-        return Edit(frozenset({i, *behind}), {}, {i: (end,)}), {(i, 0): orbit.cycle[i]}
-    return Edit(frozenset(behind), {i: end[1]}), {}
+        return Edit(frozenset({i, *following}), {}, {i: (end,)}), {(i, 0): orbit.cycle[i]}
+    return Edit(frozenset(following), {i: end[1]}), {}
 
 
 def slip_at_touch(orbit: Orbit, i: int, surface: str, departs: str, touch: FloatArray) -> Opening:
@@ -134,9 +134,9 @@ def slip_at_stop(orbit: Orbit, i: int, rest: str, departs: str) -> Opening:
     ``2 w / k``, where its velocity does.
     """
     inside = departs, left_surface(orbit.model, rest, departs)
-    behind = (i + 1) % len(orbit.itinerary)
+    following = (i + 1) % len(orbit.itinerary)
     reason = f"slide at stop {i + 1}, whose load is at its limit, before rest"
-    return insert(i, inside), {(i, 0): orbit.ends[i]}, reason, {(behind, -1): 1.0}
+    return insert(i, inside), {(i, 0): orbit.ends[i]}, reason, {(following, -1): 1.0}
 
 
 def stick_at_touch(orbit: Orbit, i: int, surface: str, rest: str, touch: FloatArray) -> Opening:

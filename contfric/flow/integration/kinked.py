@@ -173,8 +173,8 @@ def kinked_flow(motion, mode, t0, y0, dt, p, which, y1, jac):  # type: ignore[no
 
 
 @helper
-def next_kink(motion, piece, t, y, on, left, p, workspace, behind):  # type: ignore[no-untyped-def]
-    """Return the time to the next crossing and which kink it is, with the state there in ``behind``."""
+def next_kink(motion, piece, t, y, on, left, p, workspace, reached):  # type: ignore[no-untyped-def]
+    """Return the time to the next crossing and which kink it is, with the state there in ``reached``."""
     n = y.shape[0]
     found, which = -1.0, -1
     for k in range(motion.kinks):
@@ -184,7 +184,7 @@ def next_kink(motion, piece, t, y, on, left, p, workspace, behind):  # type: ign
             motion, piece, c, 0.0, starts_on, t, y, left, p, workspace, workspace.stage[:n]
         )
         if at >= 0.0 and (which < 0 or at < found):
-            write(workspace.stage[:n], behind)
+            write(workspace.stage[:n], reached)
             found, which = at, k
     return found, which
 
@@ -196,7 +196,7 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
         return -1.0
     n = y0.shape[0]
     workspace = integration_workspace(n, 1, 0, STAGES, motion.stages)
-    here, behind = y0.copy(), np.empty(n)
+    here, reached = y0.copy(), np.empty(n)
     period = motion.period(p, workspace.none, workspace.empty)
     phase = t0 - folded(t0, period) * period
     kink = -1
@@ -216,7 +216,7 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
                 y1[i] = math.nan
             return done
         t, left = phase + done, dt_max - done
-        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, behind)
+        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, reached)
         span = left if k < 0 else until
         itself = k >= 0 and c == motion.kink_of[k] and target == 0.0
         if not itself:
@@ -225,10 +225,10 @@ def kinked_hit(motion, mode, c, target, on, t0, y0, dt_max, p, y1):  # type: ign
                 return done + at
         if k < 0:
             return -1.0
-        if itself or not math.isfinite(behind[0]):
-            write(behind, y1)
+        if itself or not math.isfinite(reached[0]):
+            write(reached, y1)
             return done + until
-        write(behind, here)
+        write(reached, here)
         done, kink, piece, on = done + until, k, piece ^ (1 << k), False
     return -1.0
 
@@ -240,7 +240,7 @@ def kinked_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: i
         return 0
     n = y0.shape[0]
     workspace = integration_workspace(n, 1, 0, STAGES, motion.stages)
-    here, behind = y0.copy(), np.empty(n)
+    here, reached = y0.copy(), np.empty(n)
     period = motion.period(p, workspace.none, workspace.empty)
     phase = t0 - folded(t0, period) * period
     piece = piece_at(motion, mode, phase, here, -1, p, workspace)
@@ -250,19 +250,19 @@ def kinked_stationary(motion, mode, c, t0, y0, dt, p, times, values):  # type: i
         if workspace.control[TRIED] > MOST_STEPS:
             return -1
         t, left = phase + done, dt - done
-        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, behind)
+        until, k = next_kink(motion, piece, t, here, kink, left, p, workspace, reached)
         span = left if k < 0 else until
         found = all_stationary(
             motion, piece, c, t, here, span, p, workspace, times[count:], values[count:]
         )
-        if found < 0 or (k >= 0 and not math.isfinite(behind[0])):
+        if found < 0 or (k >= 0 and not math.isfinite(reached[0])):
             return -1
         for i in range(count, count + found):
             times[i] += done
         count += found
         if k < 0:
             return count
-        write(behind, here)
+        write(reached, here)
         done, kink, piece = done + until, k, piece ^ (1 << k)
         motion.field(
             piece, phase + done, here, p, workspace.none, workspace.stage[:n], workspace.nothing

@@ -1,4 +1,4 @@
-"""What is integrated: state, observable and variations, as one vector.
+"""The vector that is integrated: state, observable and variations.
 
 With the field ``y' = f(t, y, p)`` and M the derivatives of the state after a duration s with respect to
 (t0, y0, p)::

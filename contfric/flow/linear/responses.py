@@ -96,15 +96,15 @@ def turn(pairs, count, time, w, into):  # type: ignore[no-untyped-def]
         angle = w[j] * time
         c, s = math.cos(angle), math.sin(angle)
         a, b = pairs.once[2 * q], pairs.once[2 * q + 1]
-        out, behind = into[2 * q], into[2 * q + 1]
+        out, sines = into[2 * q], into[2 * q + 1]
         for i in range(a.shape[0]):
             out[i] += a[i] * c + b[i] * s
-            behind[i] += b[i] * c - a[i] * s
+            sines[i] += b[i] * c - a[i] * s
         if pairs.kinds[q] == _FREQUENCY:  # the pair before is that of the state
             a, b = pairs.once[2 * q - 2], pairs.once[2 * q - 1]
             for i in range(a.shape[0]):
                 out[i] += time * (b[i] * c - a[i] * s)
-                behind[i] -= time * (a[i] * c + b[i] * s)
+                sines[i] -= time * (a[i] * c + b[i] * s)
 
 
 @helper

@@ -37,9 +37,9 @@ _OTHER_STEPS = 1.0873
 @inlined_helper
 def stationary_in_step(poly, slope, first, terms, sign, done, h, bound, span, count, times, values):  # type: ignore[no-untyped-def]
     """Append the zeros of a slope in a step; return their number (-1: it failed) and the last sign."""
-    behind = 0.0
-    while behind < 1.0:
-        at, behind = first_root(slope, first, terms, behind, sign, bound)
+    passed = 0.0
+    while passed < 1.0:
+        at, passed = first_root(slope, first, terms, passed, sign, bound)
         if math.isnan(at):
             return -1, sign
         if at < 0.0:

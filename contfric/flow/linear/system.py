@@ -139,16 +139,16 @@ def growth(motion, piece, system):  # type: ignore[no-untyped-def]
             return max(own[0], own[1]) + ratio * row[1], max(ratio, 1.0 / ratio)
         if sweep == _SWEEPS:
             break
-        settled = True
+        unchanged = True
         for i in range(n):
             r, c = row[i] / units[i], column[i] * units[i]
             if not (r > 0.0 or c > 0.0):
                 continue
             ratio = (r if r > 0.0 else _FREE * c) / (c if c > 0.0 else _FREE * r)
             if not 0.25 < ratio < 4.0:
-                settled = False
+                unchanged = False
                 units[i] *= math.sqrt(math.sqrt(min(max(ratio, 1.0 / _FARTHEST), _FARTHEST)))
-        if settled:
+        if unchanged:
             break
     rows, columns, low, high = 0.0, 0.0, math.inf, 0.0
     for i in range(n):

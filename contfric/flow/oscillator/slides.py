@@ -93,8 +93,8 @@ def root_in(work, base, step):  # type: ignore[no-untyped-def]
     low, width = read(work, _LOW), read(work, _WIDE)
     high = low + width
     before = c0 + low * (p1 + low * (p2 + low * (p3 + low * (p4 + low * p5))))
-    behind = c0 + high * (p1 + high * (p2 + high * (p3 + high * (p4 + high * p5))))
-    s = low + width * (before / (before - behind))
+    end = c0 + high * (p1 + high * (p2 + high * (p3 + high * (p4 + high * p5))))
+    s = low + width * (before / (before - end))
     for _ in range(3):
         value = c0 + s * (p1 + s * (p2 + s * (p3 + s * (p4 + s * p5))))
         slope = p1 + s * (2.0 * p2 + s * (3.0 * p3 + s * (4.0 * p4 + s * (5.0 * p5))))

@@ -1,4 +1,4 @@
-"""What holds in a declared model identically in its parameters, in symbols: balls do not show it."""
+"""Identities in the parameters of a declared model, found symbolically: ball arithmetic does not see them."""
 
 from __future__ import annotations
 

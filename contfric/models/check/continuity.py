@@ -81,11 +81,10 @@ def _gentle_modes(probe: Probe) -> set[str]:
         return set()
     from contfric.models.language.formulas import is_gentle
 
-    moving = (formulas.t, *formulas.y)
-    if not all(is_gentle(value, moving) for value in formulas.observables()):
+    if not all(is_gentle(value, formulas.moving) for value in formulas.observables()):
         return set()
     # modes of a structure differ in few of their rates
-    gentle = cache(lambda rate: is_gentle(formulas.read(("modes",), rate), moving))
+    gentle = cache(lambda rate: is_gentle(formulas.read(("modes",), rate), formulas.moving))
     return {m.name for m in formulas.description.modes if all(map(gentle, m.field))}
 
 
@@ -119,8 +118,7 @@ def _may_jump(probe: Probe) -> list[str]:
         return [s.name for s in probe.model.surfaces]
     from contfric.models.language.formulas import cannot_jump
 
-    moving = (formulas.t, *formulas.y)
-    return [name for name, h in formulas.heights().items() if not cannot_jump(h, moving)]
+    return [name for name, h in formulas.heights().items() if not cannot_jump(h, formulas.moving)]
 
 
 def _height_on(probe: Probe, surface: str, line: Line, place: float) -> FloatArray:
@@ -250,11 +248,10 @@ def _continuous_resets(probe: Probe) -> set[str]:
         return set()
     from contfric.models.language.formulas import cannot_jump
 
-    moving = (formulas.t, *formulas.y)
     return {
         surface.name
         for surface, image in zip(formulas.description.surfaces, formulas.resets(), strict=True)
-        if all(cannot_jump(value, moving) for value in image)
+        if all(cannot_jump(value, formulas.moving) for value in image)
     }
 
 

@@ -23,12 +23,14 @@ def check_filippov(report: ModelReport, probe: Probe) -> None:
     for mode in probe.model.modes:
         domain = next(d for d in probe.model.domains if d.own_mode == mode.name)
         on = [name for name, side in domain.signs.items() if side == 0]
-        beside = [_beside(probe, domain, on[0], side) for side in (1, -1)] if len(on) == 1 else []
-        if len(beside) == 2 and all(beside):
-            _compare(report, probe, mode, on[0], str(beside[0]), str(beside[1]))
+        on_each_side = (
+            [_mode_on_side(probe, domain, on[0], side) for side in (1, -1)] if len(on) == 1 else []
+        )
+        if len(on_each_side) == 2 and all(on_each_side):
+            _compare(report, probe, mode, on[0], str(on_each_side[0]), str(on_each_side[1]))
 
 
-def _beside(probe: Probe, domain: Domain, surface: str, side: int) -> str | None:
+def _mode_on_side(probe: Probe, domain: Domain, surface: str, side: int) -> str | None:
     """Return the mode on one side of a domain that slides; None unless there is exactly one."""
     signs = {**domain.signs, surface: side}
     modes = {d.own_mode for d in probe.model.domains if d.signs == signs}

@@ -30,7 +30,7 @@ _STEPS = 6
 #: Step of differences: the cube root of rounding.
 _DIFFERENCE = 6e-6
 #: Parameters near the given ones are drawn within these shares of them.
-_BESIDE = 0.1
+_NEARBY = 0.1
 #: Sets of parameters that a symmetry of the model itself must hold at, besides the given ones.
 _SETS = 4
 #: Coefficients of an expression of the parameters are multiples of this.
@@ -181,8 +181,8 @@ def _maps_reset(probe: Probe, found: SignChanges, surface: str, image: str) -> b
         return False
     for place in itertools.islice(probe.on(surface, _DRAWS), _STATES):
         moved = found.of(place, probe.period)
-        behind = np.array(found.signs) * probe.reset(surface, *place) + found.shift
-        if not np.allclose(behind, probe.reset(image, *moved), rtol=_SAME, atol=_SAME):
+        after = np.array(found.signs) * probe.reset(surface, *place) + found.shift
+        if not np.allclose(after, probe.reset(image, *moved), rtol=_SAME, atol=_SAME):
             return False
     return True
 
@@ -192,9 +192,9 @@ def _maps_reset(probe: Probe, found: SignChanges, surface: str, image: str) -> b
 
 def _advice(probe: Probe, found: SignChanges) -> str:
     """Return what the symmetry is, and what can be done with it."""
-    beside = list(_beside(probe))
-    texts, simple = _shifts(probe, found, beside)
-    always = all(_is_same(found, hidden_symmetry(other)) for other in beside[:_SETS])
+    elsewhere = list(_at_other_parameters(probe))
+    texts, simple = _shifts(probe, found, elsewhere)
+    always = all(_is_same(found, hidden_symmetry(other)) for other in elsewhere[:_SETS])
     shown = ", ".join(
         _image(*row) for row in zip(probe.model.states, found.signs, texts, strict=True)
     )
@@ -216,13 +216,13 @@ def _advice(probe: Probe, found: SignChanges) -> str:
     )
 
 
-def _beside(probe: Probe) -> Iterator[Probe]:
+def _at_other_parameters(probe: Probe) -> Iterator[Probe]:
     """Yield probes at parameters near the given ones, more than there are parameters."""
     draw, values = random.Random(probe.seed), probe.model.mapping(probe.vector)
     count, wanted = 0, len(values) + 2 + _SETS
     for _ in range(50 * wanted):
         moved = {
-            name: value + _BESIDE * (abs(value) or 1.0) * draw.uniform(-1.0, 1.0)
+            name: value + _NEARBY * (abs(value) or 1.0) * draw.uniform(-1.0, 1.0)
             for name, value in values.items()
         }
         try:
@@ -239,10 +239,10 @@ def _is_same(found: SignChanges, other: SignChanges | None) -> bool:
     return other is not None and other.signs == found.signs
 
 
-def _shifts(probe: Probe, found: SignChanges, beside: list[Probe]) -> tuple[list[str], bool]:
+def _shifts(probe: Probe, found: SignChanges, elsewhere: list[Probe]) -> tuple[list[str], bool]:
     """Return the shift of each state as an expression of the parameters, or as a number if one has none."""
     first, rows, values = found.pair[0], [], []
-    for other in beside:
+    for other in elsewhere:
         places = list(other.places(first, _DRAWS, _STATES))
         shift = _shift(other, found.signs, found.pair, places) if places else None
         if shift is not None:

@@ -50,12 +50,11 @@ def _with_hidden_kinks(probe: Probe) -> list[str]:
         return []
     from contfric.models.language.formulas import may_have_kinks
 
-    moving = (formulas.t, *formulas.y)
     modes = [mode.name for mode in probe.model.modes for _ in formulas.pieces]
     found = (
         mode
         for mode, field in zip(modes, formulas.fields, strict=True)
-        if any(may_have_kinks(rate, moving) for rate in field)
+        if any(may_have_kinks(rate, formulas.moving) for rate in field)
     )
     return list(dict.fromkeys(found))
 

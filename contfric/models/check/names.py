@@ -1,4 +1,4 @@
-"""What formulas tell without a solution: names that nothing needs, defaults, unmarked kinks, two-folds."""
+"""Checks of formulas that need no solution: unused names, defaults, unmarked kinks, two-folds."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def check_kinks(report: ModelReport, model: Model) -> None:
     for mode, field in zip(modes, formulas.fields, strict=True):
         for state, rate in zip(model.states, field, strict=True):
             report.count(Topic.KINKS)
-            for kink in kinks_in(rate, (formulas.t, *formulas.y)):
+            for kink in kinks_in(rate, formulas.moving):
                 text = kink.subs({s: Symbol(name) for s, name in names.items()})
                 key = model.whole_mode(mode.name), state, str(text)
                 if key in said:
@@ -127,12 +127,12 @@ def check_reset_kinks(report: ModelReport, probe: Probe) -> None:
 
     from contfric.models.language.formulas import branches_of, kinks_in
 
-    symbols = (formulas.t, *formulas.y, *formulas.p)
+    symbols = (*formulas.moving, *formulas.p)
     names = dict(zip(symbols, ("t", *model.states, *model.parameter_names), strict=True))
     order = [surface.name for surface in formulas.description.surfaces]
     for reset in model.resets:
         image = formulas.resets()[order.index(reset.surface)]
-        kinks = {k for value in image for k in kinks_in(value, (formulas.t, *formulas.y))}
+        kinks = {k for value in image for k in kinks_in(value, formulas.moving)}
         met = list(arrivals(probe, reset)) if kinks else []
         for kink in sorted(kinks, key=str):
             report.count(Topic.KINKS)

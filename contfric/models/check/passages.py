@@ -85,7 +85,7 @@ def check_slides(report: ModelReport, probe: Probe) -> None:
         return  # which modes follow is derived
     for domain in model.domains:
         for surface, side in domain.signs.items():
-            free = surface in model.settled_sides or model.transitions.get((domain.name, surface))
+            free = surface in model.fixed_sides or model.transitions.get((domain.name, surface))
             if 0 not in domain.signs.values() or side == 0 or free:
                 continue
             if model.maps_at(domain, surface) or model.ends_at(domain, surface):

@@ -252,7 +252,7 @@ class Probe:
                 values[surface.observable] = self.flow.observe(surface.observable, t, y)
             above = values[surface.observable] - self._levels[surface.name]
             found[surface.name] = 0 if abs(above) <= ON else int(math.copysign(1, above))
-        return {**found, **self.model.settled_sides}
+        return {**found, **self.model.fixed_sides}
 
 
 class Prefix(Generic[T]):

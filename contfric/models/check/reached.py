@@ -1,4 +1,4 @@
-"""Whether solutions come into every mode, and to states at which a model is at fault: simulations tell.
+"""Checks by simulation whether every mode is reached, and whether the model fails at states on the way.
 
 States are drawn in a region that is wider than what motion visits. A fault at one of them is an error if some
 simulation meets such a fault, else a warning.
@@ -145,7 +145,7 @@ def _is_outside(probe: Probe, motion: Trajectory) -> bool:
     states = np.column_stack([rows[name] for name in model.states])
     for t, y, mode in zip(rows["t"].tolist(), states, rows["mode"], strict=True):
         domains = model.domains_of(model.whole_mode(mode))
-        for surface in (s.name for s in model.surfaces if s.name not in model.settled_sides):
+        for surface in (s.name for s in model.surfaces if s.name not in model.fixed_sides):
             side = {d.signs.get(surface, 0) for d in domains}
             if side in ({1}, {-1}) and probe.height(surface, t, y) * side.pop() < -_BEYOND:
                 return True

@@ -1,4 +1,4 @@
-"""What a check of a model found."""
+"""The report of a check of a model."""
 
 from __future__ import annotations
 

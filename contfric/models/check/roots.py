@@ -27,7 +27,7 @@ def check_roots(report: ModelReport, probe: Probe) -> None:
         return
     for surface in (s.name for s in probe.model.surfaces if probe.model.cuts(s.name)):
         for t, y in probe.on(surface, _TRIED):
-            for mode, side in _beside(probe, surface, t, y):
+            for mode, side in _modes_around(probe, surface, t, y):
                 if _grows(probe, mode, surface, side, t, y):
                     whole = probe.model.whole_mode(mode)
                     report.warn(
@@ -39,7 +39,7 @@ def check_roots(report: ModelReport, probe: Probe) -> None:
                     return
 
 
-def _beside(probe: Probe, surface: str, t: float, y: FloatArray) -> list[tuple[str, int]]:
+def _modes_around(probe: Probe, surface: str, t: float, y: FloatArray) -> list[tuple[str, int]]:
     """Return the modes next to a place on a surface, with the sides on which they are."""
     signs = probe.signs(t, y)
     return [

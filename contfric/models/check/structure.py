@@ -31,7 +31,7 @@ _SAME = 1e-8
 def check_surfaces(report: ModelReport, probe: Probe) -> None:
     """Check that each surface is reached, and that its observable changes across it."""
     for surface in probe.model.surfaces:
-        if surface.name in probe.model.settled_sides:
+        if surface.name in probe.model.fixed_sides:
             continue  # derived, and met at rest on a wall only
         reached = 0
         for t, y in probe.on(surface.name, _ON_SURFACE // 4):
@@ -74,7 +74,7 @@ def check_transitions(report: ModelReport, probe: Probe) -> None:
     """Check that every crossing that motion makes has a next domain."""
     model = probe.model
     for surface in model.surfaces:
-        if surface.name not in model.settled_sides:
+        if surface.name not in model.fixed_sides:
             _check_crossings(report, probe, surface)
 
 

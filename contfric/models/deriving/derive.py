@@ -234,9 +234,9 @@ def _departures(
     """Find where motion on a surface goes when it leaves: the side that its field points to."""
     found: dict[tuple[str, str, int], Departure] = {}
     order = [s.name for s in surfaces]
-    beside: dict[tuple[int, ...], str] = {}  # the last mode of each combination of sides
+    nearby: dict[tuple[int, ...], str] = {}  # the last mode of each combination of sides
     for domain in domains:
-        beside[tuple(domain.signs[name] for name in order)] = domain.mode
+        nearby[tuple(domain.signs[name] for name in order)] = domain.mode
     for domain in domains:
         on = [name for name, side in domain.signs.items() if side == 0]
         if len(on) != 1:
@@ -246,13 +246,13 @@ def _departures(
             signs = {**domain.signs, surface: key[2]}
             if key in found or surface == on[0] or not is_possible(surfaces, signs):
                 continue  # the first one that holds decides where motion goes
-            if tuple(signs[name] for name in order) in beside:
+            if tuple(signs[name] for name in order) in nearby:
                 continue
-            departure = _departure(sampler, on[0], surface, signs, beside)
+            departure = _departure(sampler, on[0], surface, signs, nearby)
             if departure is not None:
                 found[key] = departure
     others = tuple(found.values())
-    others = (*other_departures(sampler, domains, beside, others), *others)
+    others = (*other_departures(sampler, domains, nearby, others), *others)
     return (*limit_departures(sampler, surfaces, domains, others), *others)
 
 
@@ -263,12 +263,12 @@ def _departure(
     signs: dict[str, int],
     modes: Mapping[tuple[int, ...], str],
 ) -> Departure | None:
-    beside = {}
+    nearby = {}
     for side in (1, -1):
         mode = modes.get(tuple(side if name == on else sign for name, sign in signs.items()))
         if mode is not None:
-            beside[side] = mode
-    side = departing_side(sampler, beside, on, signs)
+            nearby[side] = mode
+    side = departing_side(sampler, nearby, on, signs)
     if side == 0:
         return None
     return Departure({on: 0, through: signs[through]}, {on: side})

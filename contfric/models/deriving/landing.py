@@ -1,4 +1,4 @@
-"""Where a reset leads: the surfaces that its images lie on, and the sides to which motion leaves them.
+"""Derives where a reset leads: the surfaces that its images lie on, and the sides they leave them to.
 
 ``theta -> -theta`` at ``theta = alpha`` lands on ``theta = -alpha``; ``omega -> r omega`` at ``theta = 0``
 stays there and lets motion pass, ``omega -> -r omega`` sends it back. Found at sampled states that motion
@@ -113,23 +113,23 @@ class Landing:
             return 0  # it leads into motion on that surface
         verdicts, asked, passed = Counter[int](), Counter[int](), True
         for before, t, y in images:
-            behind = self._behind(before, met, t, y)
+            landed = self._behind(before, met, t, y)
             turn = before.signs[surface] if own else 1
-            verdicts[turn * self._side(behind, surface, met, t, y)] += 1
+            verdicts[turn * self._side(landed, surface, met, t, y)] += 1
             others = named if own else named - {before.own_mode}
-            wanted = [d for d in behind if d.own_mode in others]
+            wanted = [d for d in landed if d.own_mode in others]
             asked[turn * self._side(wanted, surface, met, t, y)] += 1
-            passed = passed and self._is_label(surface, behind)
-        told = {side for side in verdicts if side}
-        if len(told) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
-            told = asked.keys() - {0}
-        if own and len(told) == 1 and self._may_be_slower(surface):
-            told |= {turn for turn in self._far(met) if turn}
-        if len(told) == 1 and (self.leads or not verdicts[0]):
+            passed = passed and self._is_label(surface, landed)
+        decided = {side for side in verdicts if side}
+        if len(decided) > 1 and len(asked.keys() - {0}) == 1:  # elsewhere the mode before goes on
+            decided = asked.keys() - {0}
+        if own and len(decided) == 1 and self._may_be_slower(surface):
+            decided |= {turn for turn in self._far(met) if turn}
+        if len(decided) == 1 and (self.leads or not verdicts[0]):
             return (
-                told.pop()
+                decided.pop()
             )  # the mode that is asked for may not hold at states that no solution brings
-        if own and len(told) > 1 and self.ways():
+        if own and len(decided) > 1 and self.ways():
             return EITHER
         one_sided = len({d.signs[surface] for d in self.domains} - {0}) == 1
         if own and one_sided:
@@ -156,7 +156,7 @@ class Landing:
             f"the reset at '{self.surface}' takes states to the surface '{surface}', and some of them to one "
             "side of it, some to the other, or to none: the rates after a reset must tell the side, or the "
             "mode to which it leads ('to: mode', which lies on one side of that surface)"
-            f"{_ADVICE.format(surface) if own and len(told) > 1 else ''}",
+            f"{_ADVICE.format(surface) if own and len(decided) > 1 else ''}",
         )
 
     def _staying(
@@ -220,9 +220,9 @@ class Landing:
                 return frozenset()
         return frozenset(found)
 
-    def _is_label(self, surface: str, behind: Sequence[Domain]) -> bool:
+    def _is_label(self, surface: str, landed: Sequence[Domain]) -> bool:
         """Tell whether one mode follows, on both sides of a surface: solutions pass it there unchanged."""
-        modes = {d.mode for d in behind}
+        modes = {d.mode for d in landed}
         sides = {d.signs[surface] for d in self.domains if d.mode in modes}
         return len(modes) == 1 and sides >= {1, -1}
 
@@ -231,12 +231,12 @@ class Landing:
     ) -> list[Domain]:
         """Return the domains that an image may be in, but for the sides of the surfaces that it is on."""
         sides = self.sampler.sides(t, y, [s for s in self.surfaces if s not in met])
-        behind = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
-        return led(behind, self.leads, before.own_mode)
+        landed = [d for d in self.domains if all(d.signs[s] == v for s, v in sides.items())]
+        return led(landed, self.leads, before.own_mode)
 
     def _side(
         self,
-        behind: Sequence[Domain],
+        landed: Sequence[Domain],
         surface: str,
         met: Sequence[str],
         t: float,
@@ -244,7 +244,7 @@ class Landing:
     ) -> int:
         """Return the side of a surface to which one image leaves; 0 without one, or with two."""
         away = set()
-        for domain in behind:
+        for domain in landed:
             sides = {s: domain.signs[s] for s in met if domain.signs[s]}
             rates = {s: v * self.sampler.rate(domain.mode, s, v, t, y) for s, v in sides.items()}
             if rates.get(surface, 0.0) > 0.0 and min(rates.values()) >= 0.0:

@@ -1,4 +1,4 @@
-"""What the extent of an orbit is measured by: where its displacement can have extrema.
+"""Decides what the extent of an orbit is measured by: its joints, or an observable of the displacement.
 
 Along a segment on which the rate of the displacement keeps its sign the extrema are at the ends. So it is
 in a mode in which that rate is the distance to a surface that ends the mode (x' = v, and v = 0 is

@@ -32,7 +32,7 @@ _POINTS, _PLACES = 8, 40
 #: Rounding in an identity of expressions of moderate size, relative to 1 + the values.
 _SAME = 1e-9
 #: Near a surface: a smooth field changes by about as much over it, one that jumps by far more.
-_BESIDE, _JUMP = 1e-9, 1e-5
+_NEARBY, _JUMP = 1e-9, 1e-5
 
 
 def joined_modes(description: Description) -> Mapping[str, str]:
@@ -228,7 +228,7 @@ def _kinks_of_resets(description: Description) -> set[str]:
 
     formulas = Formulas(description)
     images = [value for image in formulas.resets() for value in image]
-    found = {k for value in images for k in kinks_in(value, (formulas.t, *formulas.y))}
+    found = {k for value in images for k in kinks_in(value, formulas.moving)}
     kinks = {part for kink in found for part in branches_of(kink)}
     return {
         name
@@ -248,7 +248,7 @@ def _jumps(sampler: Sampler, mode: ModeText, surface: str) -> bool:
         size = max(map(abs, slope)) or 1.0
         sides = [
             [
-                c + side * _BESIDE * g / size
+                c + side * _NEARBY * g / size
                 for c, g in zip((place[0], *place[1]), slope, strict=True)
             ]
             for side in (1.0, -1.0)

@@ -27,7 +27,7 @@ _ON = 1e-12
 #: Central differences: the cube root of the rounding error.
 _DIFFERENCE = 6e-6
 #: Near a surface: far beyond rounding, and nothing against a rate that matters.
-_BESIDE = 1e-9
+_NEARBY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +241,6 @@ class Sampler:
         """
         slope = self.gradient(surface, t, y)
         size = math.sqrt(sum(g * g for g in slope)) or 1.0
-        beside = [a + side * _BESIDE * g / size for a, g in zip((t, *y), slope, strict=True)]
-        velocity = [1.0, *self.evaluator.field(mode, self.params, beside[0], beside[1:])]
+        nearby = [a + side * _NEARBY * g / size for a, g in zip((t, *y), slope, strict=True)]
+        velocity = [1.0, *self.evaluator.field(mode, self.params, nearby[0], nearby[1:])]
         return sum(g * v for g, v in zip(slope, velocity, strict=True))

@@ -1,4 +1,4 @@
-"""Where motion is looked for: half-widths of states about 0, or ranges, as ``spread`` of a model says."""
+"""Ranges of states in which solutions are sought, from ``spread`` of a model."""
 
 from __future__ import annotations
 

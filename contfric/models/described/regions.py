@@ -94,11 +94,11 @@ def domains_of(description: Description, surfaces: list[Surface]) -> tuple[Domai
     order = [s.name for s in surfaces]
     led = {lead.mode for leads in description.leads.values() for lead in leads}
     by_mode = {mode.name: mode.sides for mode in description.modes}
-    settled = {
+    held_sides = {
         lift: by_mode[own.mode][lift] for own in description.chatters for lift, _ in own.ways
     }
     for mode in description.modes:
-        regions = combinations(surfaces, {**mode.sides, **settled})
+        regions = combinations(surfaces, {**mode.sides, **held_sides})
         if not regions:
             raise EntryError(("modes", mode.name, "in"), _impossible(mode, surfaces))
         places[mode.name] = {tuple(sides[name] for name in order) for sides in regions}

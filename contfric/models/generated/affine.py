@@ -1,6 +1,6 @@
-"""Which modes are affine: ``y' = A(p) y`` plus constants and harmonics of time.
+"""Finds the affine modes of a model: ``y' = A(p) y`` plus constants and harmonics of time.
 
-Such a solution has a closed form (:mod:`contfric.flow.linear`). What is looked at are the formulas
+A solution in such a mode has a closed form (:mod:`contfric.flow.linear`). What is looked at are the formulas
 themselves: a mode is affine if the derivatives of its rates by the states depend on the parameters only, and
 what is left at the state 0 is a sum of ``a cos(w t) + b sin(w t)``; products of harmonics are multiplied out.
 

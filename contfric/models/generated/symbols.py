@@ -48,6 +48,11 @@ class Formulas:
         except ModelError as error:
             raise EntryError(address, str(error)) from None
 
+    @property
+    def moving(self) -> tuple[Any, ...]:
+        """Time and states: all that changes along a solution."""
+        return (self.t, *self.y)
+
     @cached_property
     def _named(self) -> dict[Any, Any]:
         """States and parameters by the names that expressions have for them."""
@@ -90,7 +95,7 @@ class Formulas:
         observables = {
             o.name: f for o, f in zip(self.description.observables, self.observables(), strict=True)
         }
-        found, moving, heights = [], (self.t, *self.y), self.heights()
+        found, moving, heights = [], self.moving, self.heights()
         for mode, bits in itertools.product(self.description.modes, self.pieces):
             signs = {
                 observables[name]: bit

@@ -1,4 +1,4 @@
-"""What the names in a model's expressions mean, and which may stand where."""
+"""The meaning of names in a model's expressions, and where each is allowed."""
 
 from __future__ import annotations
 

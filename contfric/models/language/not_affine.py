@@ -1,4 +1,4 @@
-"""What says that a formula is not affine; apart from what needs sympy to find it out."""
+"""The error that says that a formula is not affine; in its own module, so that sympy is not imported."""
 
 
 class NotAffineError(Exception):

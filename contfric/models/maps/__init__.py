@@ -1,1 +1,1 @@
-"""What a definition is asked for by name: what follows a domain, chatter, sections."""
+"""Look-up tables of a model's definition: what follows a domain, chatter, sections."""

@@ -1,4 +1,4 @@
-"""What a model says of its chatter: where impacts lead that come to rest, and what throws off a wall."""
+"""Look-up of a model's chatter: where impacts that come to rest lead, and what throws off a wall."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ChatterMaps(SectionMaps):
         return {(flight, own.surface): own for own in self.chatters for _, flight in own.ways}
 
     @cached_property
-    def settled_sides(self) -> dict[str, int]:
+    def fixed_sides(self) -> dict[str, int]:
         """The side of each surface that only ends chatter: all domains have that, on whichever they are."""
         return {
             lift: self.domains_of(own.mode)[0].signs[lift]

@@ -1,4 +1,4 @@
-"""Which mode follows where several hold beyond a surface: the one in which the fewest switches change.
+"""Chooses the mode beyond a surface where several hold: the one in which the fewest switches change.
 
 A mode that holds on both sides of the surface may be entered on either.
 """

@@ -1,4 +1,4 @@
-"""What a model is asked for by name, and its sections: surfaces between two parts of one mode.
+"""Look-up by name, and the sections of a model: surfaces between two parts of one mode.
 
 Across a section nothing changes. An orbit needs one joint at least. A model whose cycles may be smooth
 therefore declares the surface of its stops (``v = 0``) with two modes of the same field. They are one mode

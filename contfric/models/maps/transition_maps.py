@@ -1,4 +1,4 @@
-"""What a model says of its transitions: the domain that follows each (domain, surface), and mirror images.
+"""Look-up of a model's transitions: the domain that follows each (domain, surface), and mirror images.
 
 A domain is a mode with the sides of all surfaces. Where modes overlap several domains have the same sides:
 motion stays in the mode that it is in while that holds.
@@ -130,9 +130,9 @@ class TransitionMaps(ChatterMaps):
         }
         for domain in self.domains:
             for reset in self.resets:
-                behind = self._domains_after(domain, reset)
-                if behind and self.maps_at(domain, reset.surface):
-                    found[domain.name, reset.surface] = behind
+                landed = self._domains_after(domain, reset)
+                if landed and self.maps_at(domain, reset.surface):
+                    found[domain.name, reset.surface] = landed
         for own in self.chatters:  # what is one mode may be left to on either side of its section
             for domain in self.domains_of(own.mode):
                 for lift, flight in own.ways:
@@ -150,9 +150,9 @@ class TransitionMaps(ChatterMaps):
                 mapped = self.maps_at(domain, surface.name)
                 slid = self.slid_before(domain, surface.name)
                 for target in found:
-                    behind = self._domains_by_signs[self._chosen_at(domain, surface, target)]
-                    fits = {d.mode for d in nearest(behind, domain.own_mode, self._side_of)}
-                    fits |= {d.mode for d in behind if d.mode == domain.mode}
+                    landed = self._domains_by_signs[self._chosen_at(domain, surface, target)]
+                    fits = {d.mode for d in nearest(landed, domain.own_mode, self._side_of)}
+                    fits |= {d.mode for d in landed if d.mode == domain.mode}
                     named = {
                         d.own_mode
                         for d in found
@@ -221,21 +221,21 @@ class TransitionMaps(ChatterMaps):
         asked = {name: domain.signs[name] for name in self._fixed_by(reset)} | reset.sides
         if reset.surface in reset.sides:
             asked[reset.surface] *= domain.signs[reset.surface]
-        behind = self._domains_landed(reset.surface).get(
+        landed = self._domains_landed(reset.surface).get(
             tuple(asked[name] for name in sorted(asked)), []
         )
-        behind = [*behind, *self._departed(asked), *self._led_away(asked, reset, domain)]
+        landed = [*landed, *self._departed(asked), *self._led_away(asked, reset, domain)]
         for sides in self.thrown_off(asked, domain.own_mode):
-            behind += self._domains_landed(reset.surface).get(
+            landed += self._domains_landed(reset.surface).get(
                 tuple(sides[n] for n in sorted(sides)), []
             )
-        behind = [d for d in behind if not reset.ways or d.name in reset.ways]
-        behind = led(behind, reset.leads, domain.own_mode)
+        landed = [d for d in landed if not reset.ways or d.name in reset.ways]
+        landed = led(landed, reset.leads, domain.own_mode)
         if reset.stays and not reset.changes:  # it only says the mode
-            labels = {d.own_mode for d in behind if not self._side_of[d.own_mode, reset.surface]}
-            behind += across(behind, reset.surface, labels, self.domains)
+            labels = {d.own_mode for d in landed if not self._side_of[d.own_mode, reset.surface]}
+            landed += across(landed, reset.surface, labels, self.domains)
         resting = self.rest_after(domain, reset.surface)
-        return tuple(dict.fromkeys(d.name for d in (*behind, *resting)))
+        return tuple(dict.fromkeys(d.name for d in (*landed, *resting)))
 
     def _departed(self, asked: Mapping[str, int]) -> list[Domain]:
         """Return the domains in which motion leaves the surfaces that it slid on before a reset.

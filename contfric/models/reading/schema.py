@@ -1,4 +1,4 @@
-"""What a model file may say: its schema, and how data become what the rest reads.
+"""The schema of a model file, and the conversion of its data to one common form.
 
 Data come from a YAML file, a class, :func:`contfric.Mechanism` or a file of results. :func:`checked` returns
 them as plain data in one form, in which every mapping is there. What refers to something else in the file,
@@ -236,7 +236,7 @@ class Jenkins(SchemaPart):
 
 
 class Spring(SchemaPart):
-    """A spring behind a gap."""
+    """A spring across a gap."""
 
     kind: Literal["spring"]
     gap: Expression

@@ -1,1 +1,1 @@
-"""What a model file says in short, each in a module: clocks, angles, units, derived sliding, chatter."""
+"""Short forms in a model file, a module each: clocks, angles, units, derived sliding, chatter."""

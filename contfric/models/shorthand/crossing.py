@@ -100,7 +100,7 @@ class CrossingSurfaces:
         if self.det == 0:
             self.refuse("the 2 x 2 system for both switches is singular")
         formulas = self.formulas
-        arguments = [formulas.t, *formulas.y]
+        arguments = list(formulas.moving)
         entries = sympy.lambdify(
             arguments, [a.subs(formulas.defaults) for a in self.matrix], "math"
         )

@@ -204,7 +204,7 @@ class _Sliding:
         on = _known_on(formulas, height)
         self.rate_up, self.rate_down = (formulas.rate(height, f).subs(on) for f in (up, down))
         self.apart = sympy.simplify(self.rate_down - self.rate_up)
-        self.constant = not self.apart.free_symbols & {formulas.t, *formulas.y}
+        self.constant = not self.apart.free_symbols & set(formulas.moving)
         largest = self.apart.subs(formulas.defaults) if self.constant else self.apart
         self.somewhere = not largest.is_nonpositive
         self.pairs = [(a.subs(on), b.subs(on)) for a, b in zip(up, down, strict=True)]

@@ -1,4 +1,4 @@
-"""What a model says in short, written out: ties, shifts, clocks, angles, units, sliding, observables.
+"""Expands the short forms of a model: ties, shifts, clocks, angles, units, sliding, observables.
 
 Each is put into the data of a model, before it is read, as if it had been typed: nothing behind knows of it.
 """

@@ -1,4 +1,4 @@
-"""Which contacts at rest stick and which slide: a linear complementarity problem with bounds.
+"""Decides which contacts at rest stick and which slide: a linear complementarity problem with bounds.
 
 Contacts at rest have accelerations ``a = b + G lambda`` (G positive definite). Each
 

@@ -1,4 +1,4 @@
-"""What the contacts of a structure carry and dissipate, mode by mode: ``force(brake)``, ``work(brake)``.
+"""Forces and dissipated power of contacts, mode by mode: ``force(brake)``, ``work(brake)``.
 
 The force of a contact is that on the structure along the direction of its velocity or gap: against the
 velocity where friction slides, the multiplier of the constraint where it sticks, ``-stiffness*stretch`` of

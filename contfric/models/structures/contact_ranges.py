@@ -1,4 +1,4 @@
-"""What the numbers of a contact may be: a law of friction that drives, or a wall that pulls, is a mistake.
+"""Allowed values of contact parameters: friction that drives, or a wall that pulls, is a mistake.
 
 ==========  ==============================================================================================
 friction    ``0 <= kinetic <= static``; 0 means no friction

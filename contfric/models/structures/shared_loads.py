@@ -77,7 +77,7 @@ class SharedLoads:
         self._mobility = {
             (a.name, b.name): structure.mobility(a, b) for a in self.rubbing for b in self.rubbing
         }
-        self.beside = {
+        self.coupled = {
             a.name: tuple(b for b in self.rubbing if b is not a and self._feels(a, b))
             for a in self.rubbing
         }
@@ -87,19 +87,19 @@ class SharedLoads:
 
     def couples(self, contact: Contact) -> bool:
         """Tell whether the load of a contact depends on what other friction contacts do."""
-        return bool(self.beside.get(contact.name))
+        return bool(self.coupled.get(contact.name))
 
     def cluster(self, contact: Contact, states: Mapping[str, str]) -> list[Contact]:
         """Return a contact, and those that stick and are reached over others that do; far ones last."""
         found = [contact]
         for c in found:
-            found += [b for b in self.beside[c.name] if states[b.name] == "s" and b not in found]
+            found += [b for b in self.coupled[c.name] if states[b.name] == "s" and b not in found]
         return found
 
     def setting(self, contact: Contact, states: Mapping[str, str]) -> Setting:
         """Return what the load of a contact depends on, in the order of the contacts."""
         cluster = self.cluster(contact, states)
-        near = {b.name for c in cluster for b in self.beside[c.name]} - {contact.name}
+        near = {b.name for c in cluster for b in self.coupled[c.name]} - {contact.name}
         near |= {
             s.name
             for c in cluster

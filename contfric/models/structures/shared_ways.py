@@ -1,4 +1,4 @@
-"""What follows where one of several contacts that share their loads lets go, or comes to rest.
+"""Outcomes where one of several contacts that share their loads slips or comes to rest.
 
 The contacts that are at rest then, and feel each other over others that are, decide together
 (:mod:`contfric.models.structures.complementarity`): the one whose state changes, and those of its cluster

@@ -154,7 +154,7 @@ class Structure:
         self._check_locks(rubbing)
         if self.coupled and not self._made_when_visited:
             pair = next(c for c in rubbing if self.loads.couples(c))
-            other = self.loads.beside[pair.name][0]
+            other = self.loads.coupled[pair.name][0]
             raise EntryError(
                 ("contacts", other.name),
                 f"the loads of '{pair.name}' and '{other.name}' depend on each other (W . M^-1 W' is not 0); "

@@ -1,1 +1,1 @@
-"""Which solution an orbit is, whatever joints, section and number of turns it is solved with."""
+"""Tests whether two orbits are the same solution, whatever joints and sections they are solved with."""

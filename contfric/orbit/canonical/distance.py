@@ -1,4 +1,4 @@
-"""How far two solutions are apart, compiled: asked for every pair of events."""
+"""The distance of two solutions, compiled: needed for every pair of events."""
 
 from __future__ import annotations
 

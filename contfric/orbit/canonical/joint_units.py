@@ -1,4 +1,4 @@
-"""What the joints of an orbit are measured in where null directions and small numbers are told."""
+"""Units in which the joints of an orbit are measured when null directions are computed."""
 
 from __future__ import annotations
 

@@ -256,8 +256,8 @@ def _at_one_phase(whole: Orbit) -> Outline:
 
 def _impacts(whole: Orbit) -> FloatArray:
     """Return time and state in front of each reset that changes the state: a grazing impact changes none."""
-    behind = np.roll(whole.begins[:, 1:], -1, axis=0)
-    jumps = np.abs(behind - whole.ends[:, 1:]).max(axis=1) >= SAME_SOLUTION
+    following = np.roll(whole.begins[:, 1:], -1, axis=0)
+    jumps = np.abs(following - whole.ends[:, 1:]).max(axis=1) >= SAME_SOLUTION
     struck = [whole.model.reset_at(*joint) is not None for joint in whole.itinerary]
     return np.array(whole.ends[jumps & np.array(struck)])
 

@@ -1,4 +1,4 @@
-"""When a simulation that finds no periodic orbit is given up, and whether its solution is chaotic.
+"""Decides when to give up a simulation that finds no periodic orbit, and whether it is chaotic.
 
 No finite simulation shows that a solution is not periodic: chaos may be a transient, and a slow spiral
 needs thousands of periods. So the work is limited; it grows with the number of events, and about with the

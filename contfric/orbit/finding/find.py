@@ -242,9 +242,9 @@ class _Search:
 
     def longer(self, trajectory: Trajectory) -> Trajectory:
         """Return what follows a trajectory; of one that creeps the one from where that leads."""
-        behind = _after_creep(trajectory)
-        if behind is not None:
-            self.time, self.state = behind
+        following = _after_creep(trajectory)
+        if following is not None:
+            self.time, self.state = following
             return self._simulated(_MOST_EVENTS_AT_ONCE)
         self.span = min(self.span * _LONGER, self.most - self.done)
         self._say(f"{self.span} more")

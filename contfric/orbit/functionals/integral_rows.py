@@ -100,5 +100,5 @@ def enter_segment(functions, whole, i, z, turn, joint, p, own):  # type: ignore[
     if reset:
         apply_reset(functions, whole, i, joint, p, own.exact.which, own.equations)
     for j in range(n):
-        own.begin[j] = own.equations.behind[n, j] if reset else joint[1 + j]
+        own.begin[j] = own.equations.after_reset[n, j] if reset else joint[1 + j]
     return end - z[base, 0]

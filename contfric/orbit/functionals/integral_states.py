@@ -318,7 +318,7 @@ def carry(  # type: ignore[no-untyped-def]
             out[j] += own.row[j, 0]
             if exact:
                 add_to_joints(
-                    layout, whole, i, own.row[j], own.equations.behind, on_joints[j], by_parameters[j],
+                    layout, whole, i, own.row[j], own.equations.after_reset, on_joints[j], by_parameters[j],
                     d_period,
                 )  # fmt: skip
     return True

@@ -229,7 +229,7 @@ def integrate(  # type: ignore[no-untyped-def]
             continue
         if not over_segment(course, level, own, own.wholes[i]):
             return False
-        after = own.equations.behind
+        after = own.equations.after_reset
         for j in range(out.shape[0]):
             out[j] += own.row[j, 0]
             if exact:

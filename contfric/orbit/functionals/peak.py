@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from contfric.orbit.orbit import Orbit
 
 #: Where an extremum is reached: at a joint, after the reset there, inside of a segment.
-JOINT, BEHIND, INSIDE = range(3)
+JOINT, AFTER_RESET, INSIDE = range(3)
 #: Places in what says that: the segment, which of the three, the time after its start; and the next value.
 SEGMENT, KIND, TIME, NEXT = range(4)
 #: Values that differ by less than this, relative to 1 + their size, are equal: orbits are solved to 1e-13.
@@ -154,9 +154,9 @@ def find_location(functions, layout, extreme, z, p, own, stationary):  # type: i
         best = better(value, best, location, i, JOINT, 0.0)
         if whole.resets[i] >= 0:
             apply_reset(functions, whole, i, cycle[i], p, none, equations)
-            behind = equations.behind[n, :n]
-            value = sign * seen(functions, c, cycle[i, 0], behind, p, none, empty)
-            best = better(value, best, location, i, BEHIND, 0.0)
+            after_reset = equations.after_reset[n, :n]
+            value = sign * seen(functions, c, cycle[i, 0], after_reset, p, none, empty)
+            best = better(value, best, location, i, AFTER_RESET, 0.0)
         found = stationary_in(functions, extreme, i, p, own, stationary) if extreme.inside else 0
         if found < 0:
             return False
@@ -199,10 +199,10 @@ def gradient_at_location(functions, extreme, p, which, equations, stationary, ow
         for k in range(which.shape[0]):
             by_parameters[k] = grad[1 + n + k]
         return value
-    if kind == BEHIND:
+    if kind == AFTER_RESET:
         apply_reset(functions, whole, i, joint, p, which, equations)
-        value = seen(functions, c, joint[0], equations.behind[n, :n], p, which, grad)
-        add_chained(start, by_parameters, grad, equations.behind, 1 + n, n)
+        value = seen(functions, c, joint[0], equations.after_reset[n, :n], p, which, grad)
+        add_chained(start, by_parameters, grad, equations.after_reset, 1 + n, n)
         return value
     found, nearest = stationary_in(functions, extreme, i, p, own, stationary), -1
     for k in range(found):

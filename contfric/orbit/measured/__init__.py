@@ -1,1 +1,1 @@
-"""What is measured of a solved orbit: states along it, stops, extrema, quantities by name."""
+"""Measures of a solved orbit: states along it, stops, extrema, quantities by name."""

@@ -1,4 +1,4 @@
-"""How far an orbit reaches: the extrema of its displacement, at joints or inside of segments, compiled."""
+"""The largest and smallest displacement of an orbit, at joints or inside segments, compiled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is measured of an orbit by name: quantities, and their derivatives by the parameters."""
+"""Quantities of an orbit by name, and their derivatives with respect to the parameters."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Where contacts rest that never slip along an orbit."""
+"""Positions of contacts that never slip along an orbit."""

@@ -1,4 +1,4 @@
-"""What an orbit keeps: where contacts rest that never slip, in words, with gradients, and as given."""
+"""Conserved positions of an orbit: in words, with gradients, and set to given values."""
 
 from __future__ import annotations
 

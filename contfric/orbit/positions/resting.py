@@ -1,4 +1,4 @@
-r"""Where contacts rest that never slip along an orbit, and where else they may: positions of a continuum.
+r"""Positions of contacts that never slip, and the interval of other positions that they may have.
 
 What an orbit conserves (:mod:`contfric.bvp.conserved`) is, in a structure, the position of each contact
 that sticks all along: the displacement of friction, the place of a Jenkins element's slider. Elsewhere it is

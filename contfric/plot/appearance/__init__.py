@@ -1,1 +1,1 @@
-"""How figures look: names, labels, colours; and how they are written to files."""
+"""The appearance of figures: names, labels and colours; and writing them to files."""

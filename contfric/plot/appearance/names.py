@@ -71,12 +71,14 @@ def full_title(title: str, names: Sequence[str], fixed: Mapping[str, float]) -> 
     return "\n".join(filter(None, lines))
 
 
-def told(fixed: Mapping[str, float], defaults: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters that a title tells: not what is 0 and is 0 by default, a term that is not used.
+def parameters_to_show(
+    fixed: Mapping[str, float], defaults: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the parameters to name in a title: all but those that are 0 and are 0 by default (unused terms).
 
     Examples
     --------
-    >>> told({"S": 0.32, "zeta": 0.0, "h": 0.0}, {"S": 0.32, "zeta": 0.1, "h": 0.0})
+    >>> parameters_to_show({"S": 0.32, "zeta": 0.0, "h": 0.0}, {"S": 0.32, "zeta": 0.1, "h": 0.0})
     {'S': 0.32, 'zeta': 0.0}
     """
     return {n: v for n, v in fixed.items() if v != 0.0 or defaults.get(n, 0.0) != 0.0}

@@ -20,7 +20,7 @@ from PIL import Image
 from contfric.base.interrupts import held_back
 from contfric.errors import ParameterError, did_you_mean
 from contfric.models import Model
-from contfric.plot.appearance.names import full_title, told
+from contfric.plot.appearance.names import full_title, parameters_to_show
 from contfric.plot.appearance.style import SMALL, TEXT, sized
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def figure_or_new(fig: Figure | None, width: float, height: float) -> Figure:
 
 def title_axes(ax: Axes, model: Model, fixed: Mapping[str, float], title: str = "") -> None:
     """Write a title, and below it the parameters that have one value all over the axes."""
-    text = full_title(title, model.parameter_names, told(fixed, model.defaults))
+    text = full_title(title, model.parameter_names, parameters_to_show(fixed, model.defaults))
     ax.set_title(text, fontsize=sized(TEXT))
 
 

@@ -1,4 +1,4 @@
-"""How things look: colours, markers, line styles and the names on the axes."""
+"""Colours, markers, line styles and axis names of figures."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from contfric.plot.appearance.labels import lay_out
-from contfric.plot.appearance.names import full_title, parameter_label, told
+from contfric.plot.appearance.names import full_title, parameter_label, parameters_to_show
 from contfric.plot.appearance.save import (
     axes_or_new,
     figure_or_new,
@@ -228,7 +228,7 @@ def fixed_parameters(branches: Sequence[Branch]) -> dict[str, float]:
     first = branches[0]
     shown = first.model.mapping(first.vector)
     shown.pop(first.parameter, None)
-    return told(shown, first.model.defaults)
+    return parameters_to_show(shown, first.model.defaults)
 
 
 def _plot_row(

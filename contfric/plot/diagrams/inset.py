@@ -20,7 +20,7 @@ Inset: TypeAlias = bool | tuple[float, float]
 #: Events crowd where so many lie within this share of the range.
 _CROWD, _WINDOW = 4, 0.08
 #: Space on both sides of the first and last of them, as a share of their distance.
-_BESIDE = 0.3
+_NEARBY = 0.3
 #: Size of an inset, its distance from the frame and what is too near to it, as shares of the axes; space on
 #: its left and beneath it for its numbers, at least, and in heights of their letters.
 WIDTH, _HEIGHT, _EDGE, _NEAR = 0.3, 0.4, 0.06, 0.03
@@ -59,7 +59,7 @@ def crowd(marks: Sequence[Mark], width: float) -> tuple[float, float] | None:
         return None
     k = int(np.argmax(counts))
     low, high = at[k], at[k + counts[k] - 1]
-    margin = max(_BESIDE * (high - low), 1e-3 * width)
+    margin = max(_NEARBY * (high - low), 1e-3 * width)
     return low - margin, high + margin
 
 

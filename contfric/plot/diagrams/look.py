@@ -1,4 +1,4 @@
-"""How the branches of a diagram are drawn, where the user wants it otherwise."""
+"""Options for the appearance of a diagram's branches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page of a diagram shows, as plain data: lines, events, and orbits to click on.
+"""The content of a diagram's page as plain data: lines, events, and orbits to click on.
 
 Numbers are short text that a browser reads: base64 of little-endian arrays.
 """

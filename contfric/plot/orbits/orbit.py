@@ -14,7 +14,7 @@ from matplotlib.transforms import ScaledTranslation
 
 from contfric.errors import ParameterError
 from contfric.plot.appearance.labels import Anchor, lay_out, place_labels
-from contfric.plot.appearance.names import fixed_text, parameter_label, told
+from contfric.plot.appearance.names import fixed_text, parameter_label, parameters_to_show
 from contfric.plot.appearance.save import axes_or_new, figure_or_new, name_axes
 from contfric.plot.appearance.style import NEXT_TO, SMALL, TEXT, sized
 from contfric.plot.orbits.orbit_artists import (
@@ -211,7 +211,7 @@ def plot_orbit_panels(orbit: Orbit, fig: Figure | None = None) -> list[Axes]:
     plot_orbit_in_time(orbit, right)
     for ax in right[:-1]:
         ax.tick_params(labelbottom=False)
-    fixed = fixed_text(told(orbit.params, orbit.model.defaults))
+    fixed = fixed_text(parameters_to_show(orbit.params, orbit.model.defaults))
     fig.suptitle(f"{orbit.name}:  {fixed}", fontsize=sized(TEXT))
     handles = legend_handles(orbit, pieces_of(orbit, points=40))
     fig.legend(

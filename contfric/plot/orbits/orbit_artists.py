@@ -1,4 +1,4 @@
-"""What the drawings of an orbit are made of."""
+"""The parts from which drawings of an orbit are made."""
 
 from __future__ import annotations
 

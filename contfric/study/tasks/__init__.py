@@ -1,4 +1,4 @@
-"""What a study can ask for: a task is a module with its schema, checks, computation, tables and record.
+"""The tasks of a study: each is a module with its schema, checks, computation, tables and record.
 
 A new task is a module with a subclass of :class:`~contfric.study.tasks.task.Task`, and a line here.
 """

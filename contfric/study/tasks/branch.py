@@ -40,7 +40,7 @@ class ContinueTask(OneParameter):
             self.parameter,
             self.bounds,
             stability=job.study.wants(Want.STABILITY),
-            progress=job.told(self.name),
+            progress=job.progress_of(self.name),
             **self.options(),
         )
         return one_branch(branch, self.bounds)

@@ -68,7 +68,7 @@ class ExploreTask(OneParameter):
             self.bounds,
             # without stability branch points are missed
             stability=job.study.wants(Want.STABILITY) or self.verify,
-            progress=job.told(self.name),
+            progress=job.progress_of(self.name),
             **self.options(),
             **(self.seeds.argument() if self.seeds else {}),
         )

@@ -1,4 +1,4 @@
-"""What the record of a run says of a diagram, and the record as lines of text."""
+"""The part of a run's record that describes a diagram, and the record as lines of text."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class EquilibriaTask(Response, AlongParameter):
             self.parameter,
             self.bounds,
             job.study.params,
-            progress=job.told(self.name),
+            progress=job.progress_of(self.name),
             **self.options(),
         )
 

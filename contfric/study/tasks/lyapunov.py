@@ -70,7 +70,7 @@ class LyapunovTask(Response):
             study.model,
             {name: values_of(ends) for name, ends in self.grid.items()},
             {name: value for name, value in study.params.items() if name not in self.grid},
-            progress=job.told(self.name),
+            progress=job.progress_of(self.name),
             **self.options(),
         )
 

@@ -1,4 +1,4 @@
-"""What tasks that follow orbits along one parameter share: their schema, checks, tables and figures."""
+"""Shared by tasks that follow orbits along one parameter: their schema, checks, tables and figures."""
 
 from __future__ import annotations
 

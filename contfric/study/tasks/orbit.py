@@ -99,7 +99,7 @@ class Start(Task):
         return orbit
 
     def _orbit(self, job: Job) -> Orbit:
-        study, heard = job.study, job.told("orbit")
+        study, heard = job.study, job.progress_of("orbit")
         if study.orbit is not None:
             return study.orbit.resting_at(self.at or {})
         if study.signature is not None:

@@ -95,7 +95,7 @@ class PlaneTask(Task):
             (self.parameters[0], self.parameters[1]),
             pairs_of(self.range),
             self.sections,
-            progress=job.told(self.name),
+            progress=job.progress_of(self.name),
             **self.options(),
             **(self.seeds.argument() if self.seeds else {}),
         )

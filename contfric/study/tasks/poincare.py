@@ -35,8 +35,8 @@ class PoincareTask(SectionTask):
         """Simulate one solution."""
         from contfric.response.poincare import poincare
 
-        told = job.told(self.name)
-        return poincare(job.study.model, job.study.params, progress=told, **self.options())
+        progress = job.progress_of(self.name)
+        return poincare(job.study.model, job.study.params, progress=progress, **self.options())
 
     def entry(self, found: Returns) -> dict[str, Any]:
         """Return the section and how the solution ended."""

@@ -1,4 +1,4 @@
-"""What tasks share whose result plots itself: responses, equilibria, ensembles."""
+"""Shared by tasks whose result plots itself: responses, equilibria, ensembles."""
 
 from __future__ import annotations
 

@@ -51,8 +51,11 @@ class StableSetTask(Response):
         """Follow both halves."""
         from contfric.response.stable_set import stable_set
 
-        start, told = (job.found["orbit"], pairs_of(self.range)), job.told("stable set")
-        return stable_set(*start, progress=told, **self.options())
+        start, progress = (
+            (job.found["orbit"], pairs_of(self.range)),
+            job.progress_of("stable set"),
+        )
+        return stable_set(*start, progress=progress, **self.options())
 
     def fixed(self, found: StableSet) -> dict[str, float]:
         """Return all parameters."""

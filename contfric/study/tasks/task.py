@@ -1,4 +1,4 @@
-"""What every task of a study is: its schema, and what the steps of a run ask of it.
+"""The base class of tasks: a schema, and the methods that a run calls.
 
 A task is a pydantic class in a module of its own; an instance is what a study says under its key. What it
 needs to compute, to write or to draw is imported by the method that does it: reading a study loads none.
@@ -67,7 +67,7 @@ class Job:
     found: Found
     say: Say
 
-    def told(self, name: str) -> Say:
+    def progress_of(self, name: str) -> Say:
         """Return a function that takes lines of text of one step."""
         return lambda text: self.say(f"{name}: {text}")
 
