@@ -1,4 +1,4 @@
-"""A step that ends at the very event that ends a branch: what belongs to the event is not listed before it."""
+"""A step that ends at the very event that ends a branch: what belongs to the event is not listed before."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_point_on_a_crossing_sliding_makes_no_tangency() -> None:
         at = event.params["S0"]
         wanted = [b.label for b in branch.bifurcations]
         for offset in (branch.values - branch.values[0])[2:5].tolist():
-            if not S < at - offset:
+            if at - offset <= S:
                 continue
             start = cf.solve_orbit("coulomb", "0s", params | {"S0": at - offset})
             found = cf.continue_orbit(start, "S0", (S, 2.0 * S))
