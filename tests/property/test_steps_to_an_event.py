@@ -10,7 +10,7 @@ import contfric as cf
 def test_a_point_on_a_crossing_sliding_makes_no_tangency() -> None:
     """The orbit 0s does not depend on S0: points lie at offsets that are known, whatever the start."""
     rng, landed = np.random.default_rng(5), 0
-    for _ in range(20):
+    for _ in range(10):
         S = float(rng.uniform(0.1, 0.5))
         params = {"Omega": rng.uniform(0.3, 0.8), "S": S, "S0": S, "h": rng.uniform(-0.1, 0.2)}
         params["zeta"] = rng.uniform(0.0, 0.1)
@@ -31,4 +31,4 @@ def test_a_point_on_a_crossing_sliding_makes_no_tangency() -> None:
             found = cf.continue_orbit(start, "S0", (S, 2.0 * S))
             landed += int(np.sum(np.abs(found.values - at) < 1e-14 * at) > 1)
             assert [b.label for b in found.bifurcations] == wanted, start.params
-    assert landed >= 5
+    assert landed >= 3
