@@ -103,6 +103,8 @@ def resolve(orbit: Orbit, side: Side, settings: Settings) -> bool:
         if not point.lost and (note := not_critical(bifurcation, before, after, settings)):
             side.notes.append(note)
         elif ends_at(orbit, side, bifurcation, point, settings):
+            if bifurcation.kind in TERMINAL:
+                _drop_what_belongs(side, point, settings)
             return True
     if fails:
         _end_where_it_fails(orbit, side, settings)
@@ -145,7 +147,7 @@ def _is_known(
     settings: Settings,
 ) -> bool:
     """Tell whether an event is that at which the side starts, or a touch that is known already."""
-    if side.at_event and belongs_to(bifurcation, side.first, point, settings):
+    if side.at_event and belongs_to(bifurcation, side.first, settings):
         return True
     if bifurcation.kind is not Kind.T:
         return False
@@ -189,12 +191,21 @@ def locate_events(
     smooth = [
         (b, point)
         for b, point in smooth_events(Step(orbit, before, after, end, settings))
-        if point.arc < end.arc and not belongs_to(b, point, end, settings)
+        if point.arc < end.arc and not belongs_to(b, end, settings)
     ]
     return sorted([*smooth, *sliding], key=lambda pair: pair[1].arc)
 
 
-def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings) -> bool:
+def _drop_what_belongs(side: Side, end: Point, settings: Settings) -> None:
+    """Take away what belongs to the sliding event that ends a side, and was met over the step before.
+
+    That step may end at the very event, or a rounding before it: the next one finds it at its first point.
+    """
+    while side.bifurcations and belongs_to(side.bifurcations[-1], end, settings):
+        side.bifurcations.pop()
+
+
+def belongs_to(event: Bifurcation, end: Point, settings: Settings) -> bool:
     """Tell whether a smooth event before a sliding event, or after it, is part of it.
 
     Where an exit becomes tangential the branch folds and multipliers are infinite, and near there a location
@@ -204,12 +215,12 @@ def belongs_to(event: Bifurcation, point: Point, end: Point, settings: Settings)
     """
     if event.kind in TERMINAL:
         return False
-    apart = abs(point.arc - end.arc)
-    gap = abs(point.value - end.value) / settings.width
+    apart = abs(event.position - end.arc)
+    gap = abs(event.params[settings.parameter] - end.value) / settings.width
     if event.kind in _OPENS and gap > 0.0 and apart < SAME_LOCATION:
         return gap <= _TOLD * event.accuracy
     if apart < (SAME_TANGENCY if event.kind is Kind.T else SAME_LOCATION):
         return True
-    if event.kind is Kind.T or event.orbit.system.segments != len(point.joints):
+    if event.kind is Kind.T or event.orbit.system.segments != len(end.joints):
         return False
     return gap < SAME_VALUE and apart < SAME_FOLD

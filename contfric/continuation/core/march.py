@@ -7,7 +7,7 @@ last tangent (H. B. Keller, 1977). The step follows the curvature: the angle bet
 tangents is kept near a target. Arclength between points is the chord c with the correction for its
 arc, ``c (1 + angle^2 / 24)``.
 
-Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the largest pair of
+Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the pairs of
 multipliers, and the labels of its segments. The march stops at the first step over which any of them
 changes sign; :mod:`contfric.continuation.core.locate` then locates the location. A step within which one of
 them may change its sign twice is taken again, shorter (:mod:`contfric.continuation.core.pairs`).

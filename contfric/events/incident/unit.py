@@ -214,21 +214,23 @@ def _cuts(orbit: Orbit, unit: Unit) -> list[int] | None:
     """Return the segments with which the units of a whole orbit begin; None if one is not there."""
     period, whole = orbit.period, unit.model.whole_mode
     gaps = orbit.begins - unit.starts(round(period / unit.duration))[:, None]
-    if orbit.model.autonomous:
-        gaps[:, :, 0] = 0.0
-    else:
-        gaps[:, :, 0] -= period * np.rint(gaps[:, :, 0] / period)
-    lasts = orbit.durations
-    fits = (np.abs(gaps).max(axis=2) < SAME_SOLUTION) & (lasts > SAME_SOLUTION * time_unit(orbit))
-    itinerary, wanted = orbit.itinerary, [whole(unit.mode)]
+    near = np.abs(gaps[:, :, 1:]).max(axis=2) < SAME_SOLUTION
+    near &= orbit.durations > SAME_SOLUTION * time_unit(orbit)
+    modes = [whole(mode) for mode, _ in orbit.itinerary]
+    wanted = [whole(unit.mode)]
     if unit.half:
         wanted.append(whole(mirror_mode(unit.model)[unit.mode]))
-    cuts = []
-    for j, row in enumerate(fits.tolist()):
-        mode = wanted[j % len(wanted)]
-        fitting = (i for i, fit in enumerate(row) if fit and whole(itinerary[i][0]) == mode)
-        found = next(fitting, None)
+    later, cuts = gaps[:, :, 0], list[int]()
+    # without excitation time tells one turn from another, and nothing else
+    known = 0.25 * unit.duration if orbit.model.autonomous else SAME_SOLUTION
+    for j, at in enumerate(near):
+        fits, mode = at, wanted[j % len(wanted)]
+        if j or not orbit.model.autonomous:
+            fits = at & (np.abs(later[j] - period * np.rint(later[j] / period)) < known)
+        found = next((i for i in np.flatnonzero(fits).tolist() if modes[i] == mode), None)
         if found is None:
             return None
+        if not j and orbit.model.autonomous:  # any of its turns may come first
+            later = later - later[0, found]
         cuts.append(found)
     return cuts

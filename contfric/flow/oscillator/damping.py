@@ -2,10 +2,10 @@
 
 The equation differentiated with respect to zeta is ``x'' + 2 zeta x' + x = -2 v``. With the velocity of the
 slide, ``v = v0 C - L G + Re sum a_k (..)``, this is a sum of convolutions with the kernel G, linear in the
-load L, in v0 and in the amplitudes ``a_k e^{i k Omega t0}`` of the excitation. With a dot for the derivative
+load L, in v0 and in the amplitudes ``a_k e^{i k Omega t0}`` of the excitation. With a dash for the derivative
 by d, ``beta^2 = 1 - zeta^2`` and the response P to ``e^{i w r}`` (:mod:`contfric.flow.oscillator.response`),
 
-    G*G = (G - d (G' + zeta G)) / (2 beta^2),        (G*G)' = d G / 2 - zeta G*G,
+    G*G = (G - d e^{-zeta d} cos beta d) / (2 beta^2),   (G*G)' = d G / 2 - zeta G*G,
     (G*G)'' = G - 2 zeta (G*G)' - G*G,               G*P = (P - (G*G)' - (2 zeta + i w) G*G) / D,
 
 where ``D = 1 - w^2 + 2 i zeta w``; the last one is the divided difference ``exp_d[a, b, a, b, i w]`` by its
@@ -15,6 +15,8 @@ give one after the other: no term is larger than the first ones, and it takes a 
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -32,19 +34,25 @@ _SHORT, _TERMS = 1.0, 20
 
 @helper
 def responses(p, third, d):  # type: ignore[no-untyped-def]
-    """Return G, G', and P of the first and third harmonic; 0 of the third where it is not heard."""
+    """Return G, and P of the first and third harmonic; 0 of the third where it is not heard."""
     zeta, w = p[ZETA], p[OMEGA]
-    g, c, _ = free(zeta, d)
+    g = free(zeta, d)[0]
     one, three = forced(zeta, w, 0.0, d), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if third != 0.0:
         three = forced(zeta, 3.0 * w, 0.0, d)
-    return g, c, complex(one[0], -one[2]), complex(three[0], -three[2])
+    return g, complex(one[0], -one[2]), complex(three[0], -three[2])
 
 
 @helper
-def plain_convolutions(zeta, g, c, d):  # type: ignore[no-untyped-def]
-    """Return G*G with its first and second derivative by d, by its closed form."""
-    g2 = (g - d * (c + zeta * g)) / (2.0 * (1.0 - zeta) * (1.0 + zeta))
+def plain_convolutions(zeta, g, d):  # type: ignore[no-untyped-def]
+    """Return G*G with its first and second derivative by d, by its closed form.
+
+    With ``G' + zeta G = e^{-zeta d} cos(beta d)``: after a long slide all of it is small, as G is, while G'
+    is known to the rounding of 1, which near critical damping grows by ``d / beta^2``.
+    """
+    square = (1.0 - zeta) * (1.0 + zeta)
+    rest = math.exp(-zeta * d) * math.cos(math.sqrt(square) * d)
+    g2 = (g - d * rest) / (2.0 * square)
     g2_1 = 0.5 * d * g - zeta * g2
     return g2, g2_1, g - 2.0 * zeta * g2_1 - g2
 
@@ -104,14 +112,14 @@ def damping_response(p, load, v0, first, third, d, known):  # type: ignore[no-un
     first, third : complex amplitudes of the harmonics at the start
     known : of :func:`responses`; who has them for the slide itself need not ask for them again
     """
-    zeta, w, (g, c, p1, p3) = p[ZETA], p[OMEGA], known
+    zeta, w, (g, p1, p3) = p[ZETA], p[OMEGA], known
     if is_short(zeta, w, third, d):
         return short_response(zeta, w, load, v0, first, third, d)
     plain = (
         abs(zeta) < 1.0 and d * d * (1.0 - zeta * zeta) >= _LONG * _LONG and is_plain(zeta, w, d)
     )
     if plain:
-        g2, g2_1, g2_2 = plain_convolutions(zeta, g, c, d)
+        g2, g2_1, g2_2 = plain_convolutions(zeta, g, d)
         q = complex(0.0, 0.0)
     else:
         g2, g2_1, g2_2, q = convolutions(zeta, w, d)

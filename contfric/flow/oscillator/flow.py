@@ -63,7 +63,7 @@ def damping_slope(s, p, t0, x0, v0, d, own, one, three):  # type: ignore[no-unty
     if p[H] != 0.0:
         turn = complex(math.cos(3 * theta), math.sin(3 * theta))
         third, p3 = p[H] * turn, turn.conjugate() * complex(three[0], -three[2])
-    known = own[0], own[1], p1, p3
+    known = own[0], p1, p3
     return damping_response(p, x0 + s * p[S], v0, first, third, d, known)
 
 
