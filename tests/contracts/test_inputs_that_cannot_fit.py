@@ -113,9 +113,9 @@ def test_counts_that_are_none(value: Any, orbit: cf.Orbit) -> None:
         (False, True),
         {0.3, 0.7},
         {0.3: 0, 0.7: 1},
-        iter((0.3, 0.7)),
+        map(float, (0.3, 0.7)),
     ],
-    ids=shown,
+    ids=lambda given: type(given).__name__ if hasattr(given, "__next__") else shown(given),
 )
 def test_ranges_that_are_none(bounds: Any, orbit: cf.Orbit) -> None:
     refused(lambda: cf.continue_orbit(orbit, "Omega", bounds))

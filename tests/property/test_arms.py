@@ -104,11 +104,11 @@ def test_a_composed_orbit_solves_its_equations_at_once() -> None:
     assert arms is not None
     bounds = diagram.range
     settings = settings_of(fold.orbit, diagram.parameter, bounds, None, False, 1000)
-    beside = arms.beside(1e-3, settings)
-    assert beside is not None
+    near = arms.solved_near(1e-3, settings)
+    assert near is not None
     lengths_of = set()
     for sequence in ((0, 0, 0, 1), (0, 0, 1, 1), (0, 1, 1, 1)):
-        orbit = beside.orbit(sequence)
+        orbit = near.orbit(sequence)
         assert orbit.converged
         assert orbit.admissible
         holds = [h.segment for h in orbit.system.holds]
@@ -149,7 +149,7 @@ def test_many_turns_next_to_a_fold_are_those_of_one(seed: int) -> None:
     for distance, arms in product(10.0 ** rng.uniform(-7.5, -6.2, 9), folds):
         if parts and arms is folds[0]:
             break
-        near = arms.beside(distance, settings_of(arms.fold, vary, bounds, None, False, 1000))
+        near = arms.solved_near(distance, settings_of(arms.fold, vary, bounds, None, False, 1000))
         for sequence in ((0, 0, 0, 1), (0, 0, 1, 1)) if near else ():
             part = undoubled_part(near.orbit(sequence), arms.fold.model.index_of(vary))
             parts += [] if part is None else [part.periods // arms.fold.periods]

@@ -67,6 +67,8 @@ _BLUR = 1e-8
 #: Steps in which a branch leaves its start, and is near it. Steps that pass the start later are shortened
 #: to a point that is no farther from it than this share of the step.
 _FIRST_STEPS, _ON_START = 3, 1e-2
+#: Most periods of the excitation that the phase may turn by in one step: none is nearly as long as that.
+_TURNS = 8
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6
 #: Times of joints are unknowns like states. In a turn longer than this they are far larger than these, as in
@@ -80,7 +82,7 @@ _ENDLESS = 1e4
 def from_start(way, course, k, turns):  # type: ignore[no-untyped-def]
     """Return how far row k is from the start, and how far ahead of it, that many periods earlier."""
     points, later = course.points, 0.0
-    if turns != 0.0:
+    if turns != 0:
         equations = way.workspace.equations
         copy_free(way.p, way.which, points.w[k])
         later = turns * way.functions.period(way.p, equations.none, equations.empty)
@@ -96,18 +98,27 @@ def round_again(way, course, k, step):  # type: ignore[no-untyped-def]
     The phase of a solution against the excitation may turn along a closed branch: an orbit of several periods
     is then met one or more of them later, and is the same. A period may change along the branch.
     """
-    zs, ws, near, turns = course.points.joints, course.points.w, 0.0, 0.0
+    zs, ws, near = course.points.joints, course.points.w, 0.0
     for j in range(way.scale.shape[0]):
         near += (ws[k, j] - course.start_w[0, j]) ** 2 * way.scale[j]
     if math.sqrt(near) > 1.5 * step:
         return np.inf, np.inf, np.inf, np.inf
-    if way.layout.turn != 0.0:
-        equations = way.workspace.equations
+    first, most = 0, 0
+    if way.layout.turn != 0.0:  # in a long step the phase may turn by periods
+        equations, begin = way.workspace.equations, course.start_z[0, 0, 0]
         period = way.functions.period(way.p, equations.none, equations.empty)
-        turns = round((zs[k, 0, 0] - course.start_z[0, 0, 0]) / period)
-    last, before = from_start(way, course, k - 1, turns)
-    gap, ahead = from_start(way, course, k, turns)
-    return last / step, before / step, gap / step, ahead / step
+        first, most = (
+            round((zs[k - 1, 0, 0] - begin) / period),
+            round((zs[k, 0, 0] - begin) / period),
+        )
+    best = (np.inf, np.inf, np.inf, np.inf)
+    for i in range(min(abs(most - first), _TURNS) + 1):
+        turns = most - i if most > first else most + i
+        last, before = from_start(way, course, k - 1, turns)
+        gap, ahead = from_start(way, course, k, turns)
+        if last + gap < best[0] + best[2]:
+            best = (last, before, gap, ahead)
+    return best[0] / step, best[1] / step, best[2] / step, best[3] / step
 
 
 @helper
