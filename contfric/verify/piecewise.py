@@ -77,7 +77,8 @@ def _check(data: Any) -> list[str]:
             own = [k for k, s in enumerate(stated) if s.contains(disc)]
             see(own != [], "multipliers are in their discs", False)
             del stated[own[0]]
-    where = f"in the law of {len(chain.law.modes)} modes that it states"
+    count = len(chain.law.modes)
+    where = f"in the law of {count} mode{'s' if count > 1 else ''} that it states"
     return [*claims, *["multipliers"] * bool(discs_stated), where]
 
 

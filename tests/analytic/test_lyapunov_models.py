@@ -94,7 +94,8 @@ def dop853_growth(
 
     wall.terminal = stop.terminal = True  # type: ignore[attr-defined]
     wall.direction = -1.0  # type: ignore[attr-defined]
-    t, z = 0.0, np.array([*state, 1.0, 0.0])
+    # the perturbation that contfric begins with: a millionth of the other state (chaos/tangent.py)
+    t, z = 0.0, np.array([*state, 1.0, 1e-6 * np.sin(4.0)])
     reset = np.diag([1.0, -e])
     while True:
         short = solve_ivp(both, (t, t + 1e-3), z, method="DOP853", rtol=1e-13, atol=1e-15)

@@ -240,7 +240,7 @@ def test_files_and_exit_codes(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     cf.find_orbit("impact").certify().save(path)
     assert verify(path).yes
     assert main(["verify", str(path)]) == 0
-    assert "in the law of 1 modes that it states" in capsys.readouterr().out
+    assert "in the law of 1 mode that it states" in capsys.readouterr().out
     data = json.loads(path.read_text())
     data["params"]["k"] += 1e-6
     path.write_text(json.dumps(data))

@@ -310,7 +310,6 @@ def off_circle(kind: Kind, orbit: Orbit) -> float:
     """Return how far a multiplier of a turn is from where an event has it; at NS the pair from the circle."""
     mu = orbit.turn_multipliers
     if kind is Kind.NS:
-        pairs = mu[mu.imag != 0.0]
-        return float(min(np.abs(pairs if len(pairs) else mu[:1]) ** 2 - 1.0, key=abs))
+        return float(abs(mu[0]) ** 2 - 1.0)
     apart = mu - critical(kind, orbit)
     return float(apart[int(np.argmin(np.abs(apart)))].real)

@@ -35,7 +35,6 @@ from contfric.continuation.core.steps import (
     along_branch,
     correct_branch,
     observe_branch,
-    of_pairs,
 )
 
 #: What locate() follows: a column of the tests, a label, or the parameter itself.
@@ -148,7 +147,7 @@ def watched_value(way, sought, points, row):  # type: ignore[no-untyped-def]
     )
     if column == CHI_ONE:
         return one
-    return minus if column == CHI_MINUS else of_pairs(mu, min(layout.rank, mu.shape[0]))
+    return minus if column == CHI_MINUS else 1.0 - abs(mu[0]) * abs(mu[1])
 
 
 @helper

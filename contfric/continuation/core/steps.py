@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,8 +28,8 @@ from contfric.continuation.core.geometry import (
 from contfric.flow.layouts import FlowType
 
 #: Extra columns of the tests after the margins and the distances of the labels: slope of the
-#: parameter, products of 1 - mu and of 1 + mu, and what changes its sign where a pair of multipliers has the
-#: product 1 (:func:`of_pairs`).
+#: parameter, products of 1 - mu and of
+#: 1 + mu, and 1 - |mu_1 mu_2| of the two largest multipliers.
 FOLD, CHI_ONE, CHI_MINUS, CHI_PAIR = range(4)
 EXTRA = 4
 #: Correction that ends the iteration where an event is located: its test function counts to its last
@@ -180,23 +179,6 @@ correct_branch = correcting_along(normal_to_tangent, once)
 
 
 @helper
-def of_pairs(mu, rank):  # type: ignore[no-untyped-def]
-    """Return what changes its sign where two conjugate multipliers, or two real ones, have the product 1.
-
-    Of two multipliers that is ``1 - |mu_1 mu_2|``. Of more the two largest may be no pair: a real one may be
-    larger than one on the unit circle. So it is the product of ``1 - mu_i mu_j`` over all pairs, which is
-    smooth where a pair becomes real, and in which those that are neither real nor conjugate make squares.
-    """
-    if rank == 2 or math.isinf(abs(mu[0])):
-        return 1.0 - abs(mu[0]) * abs(mu[1])
-    product = complex(1.0, 0.0)
-    for i in range(1, rank):
-        for j in range(i):
-            product *= 1.0 - mu[i] * mu[j]
-    return product.real
-
-
-@helper
 def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped-def]
     """Fill everything that is watched on a corrected point; False if something is not finite."""
     workspace, layout = way.workspace, way.layout
@@ -224,7 +206,7 @@ def observe_branch(way, z, w, tw, tests, labels, mu):  # type: ignore[no-untyped
             layout, workspace.pencil, workspace.equations.close, mu, workspace.spectral
         )
         if layout.rank > 1:
-            tests[at + CHI_PAIR] = of_pairs(mu, min(layout.rank, mu.shape[0]))
+            tests[at + CHI_PAIR] = 1.0 - abs(mu[0]) * abs(mu[1])
     return finite
 
 

@@ -184,7 +184,7 @@ def _at_multiplier(step: Step, column: int, point: Point) -> list[Located]:
     if column != CHI_PAIR and np.all(np.abs(point.mu - value) > NEAR_ONE):
         return []  # chi changed its sign through infinity, where an impact grazes
     if column == CHI_PAIR:
-        if not _is_torus(point):
+        if abs(point.mu[0].imag) < _COMPLEX:
             return []  # two real multipliers with product 1: nothing happens
         kind = Kind.NS
     elif column == CHI_MINUS and not step.orbit.system.half:
@@ -196,15 +196,6 @@ def _at_multiplier(step: Step, column: int, point: Point) -> list[Located]:
     if column == CHI_MINUS and not opens_through(here, active):
         event = altered(event, bound=ROUGH)
     return [(event, point)]
-
-
-def _is_torus(point: Point) -> bool:
-    """Tell whether it is a complex pair of multipliers that has the product 1, and no real one."""
-    paired = np.abs(point.mu.imag) >= _COMPLEX
-    real = point.mu[~paired].real
-    products = np.abs(1.0 - np.outer(real, real))[np.triu_indices(len(real), 1)]
-    off = np.abs(1.0 - np.abs(point.mu[paired]) ** 2)
-    return bool(off.min(initial=np.inf) < np.inf and off.min() <= products.min(initial=np.inf))
 
 
 def _passes_vertex(step: Step, share: float) -> bool:
