@@ -16,9 +16,11 @@ from contfric.simulation.tables import MAPPED
 #: asked for. It is less than what that takes (eight speeds, each at most half of the one before), so this
 #: decides how long a look ahead takes, and not what it finds.
 _SLOW = 1e-3
-#: Impacts that come to rest in ``MOST_IMPACTS`` are, of so many in a row, at most this share as fast as of as
-#: many before: a cycle without excitation is seen after 500, where 10,000 took seconds.
-_ROW, _SHARE_OF_ROW = 250, 0.84
+#: Impacts in a row whose fastest is compared with that of as many before: a cycle without excitation is seen
+#: after 500, where 10,000 took seconds.
+_ROW = 250
+#: What remains of it at least where impacts are slow within ``MOST_IMPACTS``, a constant restitution given.
+_SHARE_OF_ROW = _SLOW ** (_ROW / MOST_IMPACTS)
 
 
 @helper

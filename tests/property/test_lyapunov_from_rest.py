@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import contfric as cf
+from contfric.base.resources import bundled_dir
 
 CONTACTS = {
     "a": {"kind": "friction", "velocity": "v1", "kinetic": "S", "static": "S0"},
@@ -43,30 +44,11 @@ def test_exponents_are_those_of_the_orbit_that_is_found(names: tuple[str, ...]) 
 
 def test_the_order_of_states_does_not_matter(tmp_path: Path) -> None:
     """Rest keeps the displacement, which is not the first state here; chaotic, from a start that sticks."""
+    text = (bundled_dir("models") / "coulomb-yaml.yaml").read_text(encoding="utf-8")
     path = tmp_path / "turned.yaml"
-    path.write_text(
-        """
-name: turned
-states: [v, x]
-parameters: {Omega: 0.35, S: 0.05, S0: 0.4}
-period: 2*pi/Omega
-observables: {u: x - cos(Omega*t)}
-surfaces:
-  F+: {observable: u, level: S0}
-  F-: {observable: u, level: -S0}
-  v: {observable: v, level: 0}
-field: {x: v, v: -u - S*sign(v)}
-modes:
-  forward: {in: {v: +}}
-  backward: {in: {v: -}}
-  stick: {in: {v: 0, F+: -, F-: +}, field: {x: 0, v: 0}}
-symmetry: x -> -x, v -> -v, t -> t + T/2
-spread: {x: 2, v: 1}
-"""
-    )
-    limits = {"periods": 200, "transient": 20}
-    turned = cf.lyapunov_exponent(cf.load_model(path), state=[0.0, 0.9], **limits)
-    params = {"Omega": 0.35, "S": 0.05, "S0": 0.4}
+    path.write_text(text.replace("states: [x, v]", "states: [v, x]"), encoding="utf-8")
+    limits, params = {"periods": 200, "transient": 20}, {"Omega": 0.35, "S": 0.05, "S0": 0.4}
+    turned = cf.lyapunov_exponent(cf.load_model(path), params, state=[0.0, 0.9], **limits)
     usual = cf.lyapunov_exponent("coulomb", params, state=[0.9, 0.0], **limits)
     assert turned.motion is usual.motion is cf.Motion.CHAOTIC
     assert turned.largest > 0.0

@@ -7,7 +7,7 @@ last tangent (H. B. Keller, 1977). The step follows the curvature: the angle bet
 tangents is kept near a target. Arclength between points is the chord c with the correction for its
 arc, ``c (1 + angle^2 / 24)``.
 
-Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the pairs of
+Every accepted point is watched: margins, slope p', ``chi(1)``, ``chi(-1)``, the largest pair of
 multipliers, and the labels of its segments. The march stops at the first step over which any of them
 changes sign; :mod:`contfric.continuation.core.locate` then locates the location. A step within which one of
 them may change its sign twice is taken again, shorter (:mod:`contfric.continuation.core.pairs`).
@@ -67,7 +67,8 @@ _BLUR = 1e-8
 #: Steps in which a branch leaves its start, and is near it. Steps that pass the start later are shortened
 #: to a point that is no farther from it than this share of the step.
 _FIRST_STEPS, _ON_START = 3, 1e-2
-#: Most periods of the excitation that the phase may turn by in one step: none is nearly as long as that.
+#: Most periods of the excitation by which the phase is taken to turn in one step: a step in which it turns by
+#: more is far longer than the branch it would follow.
 _TURNS = 8
 #: A state this large (nondimensional) is on its way to infinity: resonance without damping.
 _UNBOUNDED = 1e6

@@ -120,11 +120,11 @@ def _turns(probe: Probe) -> Iterator[tuple[str, Domain, str, Place, FloatArray]]
                 signs = probe.signs(t, y) | lies
                 if not {**domain.signs, reset.surface: 0}.items() <= signs.items():
                     continue
-                behind = probe.signs(t, image)
+                landed = probe.signs(t, image)
                 after = [
                     d.own_mode
                     for d in map(model.domain_by_name.__getitem__, targets)
-                    if all(behind[name] in (side, 0) for name, side in d.signs.items())
+                    if all(landed[name] in (side, 0) for name, side in d.signs.items())
                 ]
                 if after:
                     own = domain.own_mode
